@@ -1,0 +1,46 @@
+"""towtank: from the shape of a slender underwater craft to a manoeuvring model, by captive tests in a virtual tank.
+
+The public names are listed in ``__all__`` and loaded on first use, so that importing the package costs little.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from towtank.provenance import VERSION as __version__
+
+_PUBLIC = {
+    "read_craft": "towtank.craft.library",
+    "check": "towtank.craft.hydrostatics",
+    "standard_plan": "towtank.plan.standard",
+    "tow": "towtank.tank.campaign",
+    "FastTank": "towtank.tank.fast.tank",
+    "LpmTank": "towtank.tank.lpm",
+    "Run": "towtank.tank.run",
+    "derive": "towtank.derive.derive",
+    "Derivatives": "towtank.derive.table",
+    "Model": "towtank.model.equations",
+    "straight_run": "towtank.trials.straight",
+    "turning_circle": "towtank.trials.circle",
+    "zigzag": "towtank.trials.zigzag",
+    "spiral": "towtank.trials.spiral",
+    "pull_out": "towtank.trials.pullout",
+    "heading_step": "towtank.trials.steps",
+    "depth_step": "towtank.trials.steps",
+    "lawnmower": "towtank.trials.mission",
+    "assess": "towtank.verdict.assess",
+    "report": "towtank.report.build",
+}
+
+__all__ = ["__version__", *sorted(_PUBLIC)]  # noqa: PLE0604 - the names are resolved by __getattr__
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'towtank' has no attribute {name!r}")
+    return getattr(importlib.import_module(_PUBLIC[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

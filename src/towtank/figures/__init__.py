@@ -1,0 +1,1 @@
+"""One function per figure; each takes a noun and returns Axes."""

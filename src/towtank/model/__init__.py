@@ -1,0 +1,1 @@
+"""Stage 6: the 6-DOF lumped-parameter model."""

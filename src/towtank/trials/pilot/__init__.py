@@ -1,0 +1,1 @@
+"""Autopilots: heading, depth and roll loops, actuator limits, guidance."""

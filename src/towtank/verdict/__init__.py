@@ -1,0 +1,1 @@
+"""Stage 8: is the craft stable, and what does it cost to hold it."""
