@@ -103,9 +103,7 @@ def read_json(path: Path, schema: str) -> dict[str, Any]:
     return dict(document)
 
 
-def write_netcdf(
-    path: Path, schema: str, variables: Mapping[str, Variable], attrs: Mapping[str, Any]
-) -> Path:
+def write_netcdf(path: Path, schema: str, variables: Mapping[str, Variable], attrs: Mapping[str, Any]) -> Path:
     """Write a netCDF-4 file. Attributes that are not text or numbers are stored as JSON text."""
     import h5netcdf
 
@@ -113,9 +111,7 @@ def write_netcdf(
         with h5netcdf.File(part, "w") as file:
             file.attrs["schema"] = schema
             for key, value in attrs.items():
-                file.attrs[key] = (
-                    value if isinstance(value, str | int | float) else json.dumps(_jsonable(value))
-                )
+                file.attrs[key] = value if isinstance(value, str | int | float) else json.dumps(_jsonable(value))
             for name, variable in variables.items():
                 values = np.asarray(variable.values)
                 for dim, size in zip(variable.dims, values.shape, strict=True):
@@ -162,6 +158,5 @@ def series(
 ) -> dict[str, Variable]:
     """Variables named ``names``, one for each last-axis column of ``values``."""
     return {
-        name: Variable(dims, np.ascontiguousarray(values[..., i]), attrs.get(name, {}))
-        for i, name in enumerate(names)
+        name: Variable(dims, np.ascontiguousarray(values[..., i]), attrs.get(name, {})) for i, name in enumerate(names)
     }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from towtank.errors import InputError
 
@@ -22,7 +22,7 @@ ANGLE_UNITS = ("rad", "rad/s")
 
 
 @functools.cache
-def _registry() -> pint.UnitRegistry:
+def _registry() -> pint.UnitRegistry[Any]:
     import pint
 
     return pint.UnitRegistry()
@@ -47,9 +47,7 @@ def si(value: Quantity, unit: str, where: str = "value") -> float:
         Not a number, NaN or infinite, wrong dimension, or a bare angle.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise InputError(
-            f"{where}: {value!r} is not a number. Write a number in SI units or text with a unit."
-        )
+        raise InputError(f"{where}: {value!r} is not a number. Write a number in SI units or text with a unit.")
     number = _parse(value, unit, where) if isinstance(value, str) else _bare(float(value), unit, where)
     if not math.isfinite(number):
         raise InputError(f"{where}: {value!r} is not finite. Give a finite number.")
@@ -69,7 +67,7 @@ def _parse(text: str, unit: str, where: str) -> float:
     import pint
 
     try:
-        quantity = _registry().Quantity(text)
+        quantity: Any = _registry().Quantity(text)
     except Exception as error:  # pint raises many kinds, tokenizer errors among them
         raise InputError(
             f'{where}: {text!r} is not a quantity ({error}). Write for example "2 {unit or "-"}".'

@@ -69,8 +69,7 @@ class Fin:
     def trailing_edge_at(self, y: Array | float) -> Array:
         """Distance of the trailing edge aft of the nose [m] at the radius ``y`` [m]."""
         return np.asarray(
-            self.trailing_edge
-            + np.tan(self.trailing_edge_sweep) * (np.asarray(y, dtype=float) - self.root_radius)
+            self.trailing_edge + np.tan(self.trailing_edge_sweep) * (np.asarray(y, dtype=float) - self.root_radius)
         )
 
     @property
@@ -87,7 +86,8 @@ class Fin:
 @dataclass(frozen=True)
 class Mass:
     """Rigid body. ``mass`` and ``displaced_mass`` [kg], ``cg`` (3,) [m] from the origin, ``inertia`` (3, 3) [kg m2]
-    about the origin (the tensor: off-diagonal entries are minus the products of inertia)."""
+    about the origin (the tensor: off-diagonal entries are minus the products of inertia).
+    """
 
     mass: float
     displaced_mass: float
@@ -164,9 +164,7 @@ class Craft:
         delta = np.atleast_2d(delta)
         if not self.fins:
             return np.zeros((len(delta), 4))
-        return np.concatenate(
-            [delta @ np.linalg.pinv(self.mixing).T, (delta**2).sum(axis=1, keepdims=True)], axis=1
-        )
+        return np.concatenate([delta @ np.linalg.pinv(self.mixing).T, (delta**2).sum(axis=1, keepdims=True)], axis=1)
 
     @cached_property
     def symmetry(self) -> str:

@@ -49,9 +49,7 @@ class CaptiveTest:
     @property
     def kind(self) -> str:
         """Kind of the motion, or ``fins`` for a straight run with a deflected fin."""
-        steady_ahead = (
-            self.motion.kind in ("drift", "incidence") and getattr(self.motion, "angle", 1.0) == 0.0
-        )
+        steady_ahead = self.motion.kind in ("drift", "incidence") and getattr(self.motion, "angle", 1.0) == 0.0
         return "fins" if steady_ahead and any(self.fins) else self.motion.kind
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.frames import Array
 from towtank.plan.history import History
@@ -60,7 +61,7 @@ class Run:
         return self.period == 0.0
 
     @property
-    def settled(self) -> Array:
+    def settled(self) -> NDArray[np.intp]:
         """Indices of the samples to be analysed: whole periods, the first dropped; all of them when steady."""
         n = len(self.history.time)
         if self.steady:
@@ -76,6 +77,4 @@ class Run:
         from towtank.tank.files import run_variables
 
         variables, attrs = run_variables(self)
-        return xarray.Dataset(
-            {k: (v.dims, v.values, dict(v.attrs)) for k, v in variables.items()}, attrs=attrs
-        )
+        return xarray.Dataset({k: (v.dims, v.values, dict(v.attrs)) for k, v in variables.items()}, attrs=attrs)
