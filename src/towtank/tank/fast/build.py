@@ -1,0 +1,94 @@
+"""From a craft to what the load functions need: panels solved, boundary layer marched, fins measured. Cached by craft."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from towtank.craft.craft import Craft
+from towtank.frames import Array, body_x
+from towtank.tank.fast.boundary import WAKE_STATION, BoundaryLayer, march, wake_factor
+from towtank.tank.fast.fins import FinData, fin_data
+from towtank.tank.fast.hull import HullData, finite_length_factor
+from towtank.tank.fast.potential import HullFlow, added_mass_with_fins, hull_flow
+
+STRIPS = 48
+REYNOLDS_RANGE = np.geomspace(0.05, 3.0, 7)
+"""Reynolds numbers of the drag table over that of the design speed."""
+
+
+@dataclass(frozen=True)
+class Build:
+    """A craft ready for the fast tank. ``layer`` is ahead, its last column at the design Reynolds number."""
+
+    hull: HullData
+    fins: tuple[FinData, ...]
+    layer: BoundaryLayer
+    reynolds: float
+    panels: int
+
+
+def wetted_area(craft: Craft) -> float:
+    """Wetted area of the bare hull [m2]."""
+    x = np.linspace(0.0, craft.length, 4001)
+    r = craft.profile.radius(x)
+    return float(np.sum(np.pi * (r[1:] + r[:-1]) * np.hypot(np.diff(x), np.diff(r))))
+
+
+@functools.lru_cache(maxsize=8)
+def build(craft: Craft, speed: float) -> Build:
+    """Solve the craft at its design ``speed`` [m/s]. About a second; kept for the last eight crafts."""
+    flow = hull_flow(craft)
+    length = craft.length
+    design = craft.water.reynolds(speed, length)
+    reynolds = np.append(REYNOLDS_RANGE, 1.0) * design
+    layer = march(craft.profile.radius, length, reynolds, flow.panels.station, flow.surface_speed)
+    astern = _march_astern(craft, flow, design)
+    fins = tuple(_fin(craft, layer, index, speed) for index in range(len(craft.fins)))
+    hull = _hull(craft, flow, layer, astern, reynolds)
+    return Build(hull, fins, layer, design, int(np.prod(flow.panels.shape)))
+
+
+def _march_astern(craft: Craft, flow: HullFlow, design: float) -> BoundaryLayer:
+    def reversed_radius(x: Array) -> Array:
+        return craft.profile.radius(craft.length - np.asarray(x))
+
+    station, speed = craft.length - flow.panels.station[::-1], flow.surface_speed[::-1]
+    return march(reversed_radius, craft.length, np.array([design]), station, speed)
+
+
+def _fin(craft: Craft, layer: BoundaryLayer, index: int, speed: float) -> FinData:
+    fin = craft.fins[index]
+    chord = float(fin.chord(0.5 * (fin.root_radius + fin.tip_radius)))
+    reynolds = max(craft.water.reynolds(speed, chord), 1e3)
+    friction = 0.075 / (np.log10(reynolds) - 2.0) ** 2
+    return fin_data(craft, fin, wake_factor(layer, fin, -1), friction)
+
+
+def _hull(craft: Craft, flow: HullFlow, layer: BoundaryLayer, astern: BoundaryLayer, reynolds: Array) -> HullData:
+    length, origin = craft.length, craft.origin_from_nose
+    edge = np.linspace(0.0, length, STRIPS + 1)
+    middle = 0.5 * (edge[1:] + edge[:-1])
+    added = added_mass_with_fins(craft, flow)
+    return HullData(
+        density=craft.water.density,
+        viscosity=craft.water.kinematic_viscosity,
+        length=length,
+        largest=craft.diameter,
+        bow=origin,
+        wetted=wetted_area(craft),
+        added=0.5 * (added + added.T),
+        added_hull=0.5 * (flow.added_mass + flow.added_mass.T),
+        log_reynolds=np.log(reynolds[:-1]),
+        drag_area=layer.drag_area[:-1],
+        momentum_tail=float(layer.stern_momentum_area[-1]),
+        momentum_nose=float(astern.stern_momentum_area[-1]),
+        x_tail=float(body_x(WAKE_STATION * length, origin)),
+        x_nose=float(body_x((1.0 - WAKE_STATION) * length, origin)),
+        x=body_x(middle, origin),
+        diameter=2.0 * craft.profile.radius(middle),
+        width=np.diff(edge),
+        finite_length=finite_length_factor(length / craft.diameter),
+    )

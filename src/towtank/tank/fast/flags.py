@@ -1,0 +1,52 @@
+"""Validity remarks: what in a run lies outside what the fast tank was checked on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from towtank.tank.fast.build import Build
+from towtank.tank.fast.fins import STALL_ANGLE, STALL_ASPECT
+from towtank.tank.fast.record import Record
+
+
+def flags(body: Build, record: Record) -> tuple[str, ...]:
+    """Short sentences, each with the limit that is passed; empty when nothing is."""
+    return tuple([*_shape_flags(body), *_motion_flags(body, record)])
+
+
+def _shape_flags(body: Build) -> list[str]:
+    hull = body.hull
+    slenderness = hull.length / hull.largest
+    found = []
+    if not 6.0 <= slenderness <= 13.0:
+        found.append(f"slenderness {slenderness:.1f} outside 6-13, the range compared with other data")
+    if body.reynolds < 1e6:
+        found.append(f"Reynolds number {body.reynolds:.1e} below 1e6: laminar flow is not modelled")
+    if float(body.layer.stern_shape[-1]) > 2.2:
+        found.append(
+            f"shape factor {float(body.layer.stern_shape[-1]):.2f} at the stern above 2.2: close to separation"
+        )
+    for data in body.fins:
+        ratio = 1.0 - np.sqrt(0.5 * data.aspect * data.area) / data.fin.tip_radius
+        if ratio > 0.6:
+            found.append(f"fin {data.fin.name}: hull radius over tip radius {ratio:.2f} above 0.6")
+    return found
+
+
+def _motion_flags(body: Build, record: Record) -> list[str]:
+    u = record.nu[:, 0]
+    cross = np.hypot(record.nu[:, 1], record.nu[:, 2])
+    angle = float(np.degrees(np.arctan2(cross, np.maximum(u, 1e-12)).max()))
+    found = []
+    if u.min() <= 0.0:
+        found.append("not moving ahead all the time: order of magnitude only")
+    elif angle > 20.5:
+        found.append(f"angle to the flow {angle:.0f} deg above 20 deg: the cross-flow law was set to 18 deg")
+    if len(u) > 2 and not record.remembers:
+        found.append("memory switched off: it needs headway all along the run")
+    for index, data in enumerate(body.fins):
+        stall = np.degrees(float(np.interp(data.aspect, STALL_ASPECT, STALL_ANGLE)))
+        largest = float(np.degrees(np.abs(record.delta[:, index]).max()))
+        if largest > 0.6 * stall:
+            found.append(f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- 6 deg)")
+    return found
