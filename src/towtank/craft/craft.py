@@ -1,4 +1,7 @@
-"""The craft: hull, fins, mass, propeller. Frozen data in SI; geometry from the nose aft, everything else in body axes."""
+"""The craft: hull, fins, mass, propeller. Frozen data in SI.
+
+Geometry runs from the nose aft; everything else is in body axes.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,9 @@ class Profile(Protocol):
 
     def radius(self, x: Array) -> Array:
         """Radius [m] at the distances ``x`` [m] aft of the nose, any shape; zero outside 0..length."""
+
+    def __hash__(self) -> int:
+        """Profiles are frozen data: integrals over them are kept by value."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +91,18 @@ class Fin:
 
 @dataclass(frozen=True)
 class Mass:
-    """Rigid body. ``mass`` and ``displaced_mass`` [kg], ``cg`` (3,) [m] from the origin, ``inertia`` (3, 3) [kg m2]
-    about the origin (the tensor: off-diagonal entries are minus the products of inertia).
+    """Rigid body and buoyancy.
+
+    ``mass`` and ``displaced_mass`` [kg], ``cg`` (3,) [m] from the origin, ``inertia`` (3, 3) [kg m2] about the origin
+    (the tensor: off-diagonal entries are minus the products of inertia), ``cb`` (3,) [m]: centre of buoyancy from the
+    origin, zero unless the file moves the origin.
     """
 
     mass: float
     displaced_mass: float
     cg: tuple[float, float, float]
     inertia: tuple[tuple[float, float, float], ...]
+    cb: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -113,8 +123,9 @@ class Propeller:
 
 @dataclass(frozen=True)
 class Craft:
-    """A craft as tested. ``origin_from_nose`` [m]: the body origin (the centre of buoyancy unless the file says otherwise).
+    """A craft as tested.
 
+    ``origin_from_nose`` [m]: the body origin (the centre of buoyancy unless the file says otherwise).
     ``assumed``: dotted names of the numbers the file marks as assumed. ``unsourced``: those without a source.
     ``sources``: dotted name of a table or number -> source text.
     """
@@ -170,8 +181,8 @@ class Craft:
     def symmetry(self) -> str:
         """``fourfold``, ``mirror`` (both planes), ``port-starboard`` or ``none``, from the fin layout alone."""
         shapes = {
-            (round(np.degrees(fin.azimuth) % 360.0, 6) % 360.0, fin.root_radius, fin.root_chord, fin.tip_radius, fin.tip_chord,
-             fin.trailing_edge, fin.trailing_edge_sweep, fin.section)
+            (round(np.degrees(fin.azimuth) % 360.0, 6) % 360.0, fin.root_radius, fin.root_chord, fin.tip_radius,
+             fin.tip_chord, fin.trailing_edge, fin.trailing_edge_sweep, fin.section)
             for fin in self.fins
         }  # fmt: skip
 
