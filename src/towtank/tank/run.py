@@ -21,7 +21,8 @@ class Run:
     """Loads and motion of one captive test; N samples about the body origin, SNAME axes, SI.
 
     id : file-name slug with hash.   name, kind : of the captive test.
-    craft : name.   symmetry : of the craft, as in ``Craft.symmetry``.   level : "semi-empirical", "rans", "experiment", "published", or "known coefficients".
+    craft : name.   symmetry : of the craft, as in ``Craft.symmetry``.
+    level : "semi-empirical", "rans", "experiment", "published", or "known coefficients".
     speed : reference speed U [m/s].   period : [s], 0 when steady.   periods : number of periods recorded.
     density [kg/m3], length [m], origin_from_nose [m] : reference of the loads.
     history : time, position, attitude, velocities, accelerations.
