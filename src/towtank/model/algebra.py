@@ -1,0 +1,117 @@
+"""Small matrices of scalars, for one text that runs on floats, arrays and symbols.
+
+A matrix is a nested list. A structural zero is the literal ``0``: products skip it, so what the source prints as zero
+costs nothing and leaves no trace in generated code. A scalar is a float, an array (one entry per member of a batch) or
+a symbol; no function asks for the truth of a scalar, so there is no branch on a state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from operator import mul
+from types import SimpleNamespace
+from typing import Any, Protocol, cast
+
+import numpy as np
+
+Scalar = Any
+"""A float, an array of any shape, or a symbol."""
+
+Vector = Sequence[Scalar]
+Matrix = Sequence[Sequence[Scalar]]
+
+ZERO = 0
+"""The structural zero. Python keeps one object for it, so identity tells it from a number that happens to be 0.0."""
+
+
+class Ops(Protocol):
+    """The elementary functions the equations need. ``numpy`` and ``casadi`` have them under these names."""
+
+    @property
+    def sin(self) -> Callable[[Scalar], Scalar]:
+        """Sine."""
+
+    @property
+    def cos(self) -> Callable[[Scalar], Scalar]:
+        """Cosine."""
+
+    @property
+    def fabs(self) -> Callable[[Scalar], Scalar]:
+        """Absolute value."""
+
+    @property
+    def sqrt(self) -> Callable[[Scalar], Scalar]:
+        """Square root."""
+
+    @property
+    def fmin(self) -> Callable[[Scalar, Scalar], Scalar]:
+        """Smaller of two."""
+
+    @property
+    def fmax(self) -> Callable[[Scalar, Scalar], Scalar]:
+        """Larger of two."""
+
+    @property
+    def atan2(self) -> Callable[[Scalar, Scalar], Scalar]:
+        """Angle of the point (second, first)."""
+
+
+MATH: Ops = cast(
+    Ops,
+    SimpleNamespace(sin=math.sin, cos=math.cos, fabs=math.fabs, sqrt=math.sqrt, fmin=min, fmax=max, atan2=math.atan2),
+)
+"""Functions of floats."""
+
+NUMPY: Ops = cast(Ops, np)
+"""Functions of arrays."""
+
+
+def ops_for(*scalars: Scalar) -> Ops:
+    """``NUMPY`` when any of ``scalars`` is an array with at least one axis, else ``MATH``."""
+    return NUMPY if any(isinstance(x, np.ndarray) and x.ndim for x in scalars) else MATH
+
+
+def product(matrix: Matrix, vector: Vector) -> list[Scalar]:
+    """Matrix times vector; structural zeros are skipped.
+
+    Floats take a shorter way to the same sums: multiplying by the structural zero is cheaper than asking for it.
+    """
+    if type(vector[0]) is not float:
+        return [sum([a * b for a, b in zip(row, vector, strict=True) if a is not ZERO]) for row in matrix]
+    if len(vector) == 3:
+        x1, x2, x3 = vector
+        return [a1 * x1 + a2 * x2 + a3 * x3 for a1, a2, a3 in matrix]
+    if len(vector) != 6:
+        return [sum(map(mul, row, vector)) for row in matrix]
+    x1, x2, x3, x4, x5, x6 = vector
+    return [a1 * x1 + a2 * x2 + a3 * x3 + a4 * x4 + a5 * x5 + a6 * x6 for a1, a2, a3, a4, a5, a6 in matrix]
+
+
+def product_transposed(matrix: Matrix, vector: Vector) -> list[Scalar]:
+    """Transposed matrix times vector."""
+    return product([*zip(*matrix, strict=True)], vector)
+
+
+def cross(a: Vector, b: Vector) -> list[Scalar]:
+    """Vector product of two vectors (3,)."""
+    a1, a2, a3 = a
+    b1, b2, b3 = b
+    return [a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1]
+
+
+def interpolate(x: Scalar, knots: Sequence[float], values: Sequence[float], ops: Ops) -> Scalar:
+    """Piecewise-linear table, held constant beyond its ends; a sum of ramps, so it works on symbols too.
+
+    knots must rise; values is as long as knots.
+    """
+    total: Scalar = values[0]
+    for i in range(len(knots) - 1):
+        slope = (values[i + 1] - values[i]) / (knots[i + 1] - knots[i])
+        total = total + slope * (ops.fmin(ops.fmax(x, knots[i]), knots[i + 1]) - knots[i])
+    return total
+
+
+def frozen(matrix: Any) -> list[list[Scalar]]:
+    """A constant array (n, m) as nested lists with the literal ``0`` wherever the entry is exactly zero."""
+    return [[float(a) if a != 0.0 else ZERO for a in row] for row in np.asarray(matrix, dtype=float)]

@@ -1,0 +1,127 @@
+"""Thrust: constant in the manoeuvre, or a propeller with its open-water table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from towtank.craft.craft import Craft
+from towtank.errors import CraftError
+from towtank.model.algebra import MATH, Ops, Scalar, interpolate
+
+_FORCE_FLOOR = 1e-30
+"""Smallest square of the shaft speed [1/s2] that divides the advance ratio."""
+
+
+@dataclass(frozen=True)
+class Screw:
+    """A propeller in its working point.
+
+    advance, kt, kq : the open-water table, advance rising.   balance : advance ratio at which the thrust balances the
+    resistance; it is the same at every speed, because both grow with the square of speed.
+    density [kg/m3], diameter [m], wake, deduction [-], torque : sense of the torque on the hull (+1, -1 or 0).
+    """
+
+    density: float
+    diameter: float
+    wake: float
+    deduction: float
+    torque: float
+    advance: tuple[float, ...]
+    kt: tuple[float, ...]
+    kq: tuple[float, ...]
+    balance: float
+
+    @property
+    def force_per_square(self) -> float:
+        """Force on the hull at the balance point per n|n| [N s2]."""
+        kt = interpolate(self.balance, self.advance, self.kt, MATH)
+        return float((1.0 - self.deduction) * self.density * self.diameter**4 * kt)
+
+
+def screw_of(craft: Craft, resistance: float) -> Screw | None:
+    """The propeller of ``craft``, or None when it has no table (thrust is then constant in the manoeuvre).
+
+    resistance : -Xuu [kg/m].
+
+    Raises
+    ------
+    CraftError
+        The table does not rise, the diameter is not positive, or no advance ratio balances the resistance.
+    """
+    propeller = craft.propeller
+    if not propeller.table:
+        return None
+    table = np.asarray(propeller.table, dtype=float)
+    where = f"craft {craft.name}: propeller"
+    if propeller.diameter <= 0.0 or len(table) < 2 or np.any(np.diff(table[:, 0]) <= 0.0):
+        raise CraftError(
+            f"{where}: the table needs a positive diameter and at least two rows (J, KT, KQ) with rising J."
+        )
+    advance, kt, kq = (tuple(float(x) for x in column) for column in table.T)
+    demand = (
+        resistance
+        / (craft.water.density * propeller.diameter**2)
+        / ((1.0 - propeller.thrust_deduction) * (1.0 - propeller.wake) ** 2)
+    )
+
+    def excess(j: float) -> float:
+        return float(interpolate(j, advance, kt, MATH)) - demand * j * j
+
+    low, high = max(advance[0], 0.0), advance[-1]
+    if resistance <= 0.0 or excess(low) <= 0.0 or excess(high) >= 0.0:
+        raise CraftError(
+            f"{where}: no advance ratio between {low:g} and {high:g} gives a thrust that balances the resistance "
+            f"{resistance:.4g} u2 N. Extend the table, correct the diameter, or leave the table out."
+        )
+    balance = float(brentq(excess, low, high, xtol=1e-14))
+    return Screw(
+        craft.water.density,
+        propeller.diameter,
+        propeller.wake,
+        propeller.thrust_deduction,
+        propeller.torque,
+        advance,
+        kt,
+        kq,
+        balance,
+    )
+
+
+def steady_thrust(resistance: float, speed: Scalar, ops: Ops) -> Scalar:
+    """Thrust [N] that balances the resistance at ``speed`` [m/s].
+
+    Source     THEORY section 6: F_T = -Xuu u_c|u_c|.
+    """
+    return resistance * speed * ops.fabs(speed)
+
+
+def thrust_load(screw: Screw | None, command: Scalar, u: Scalar, ops: Ops) -> tuple[Scalar, Scalar]:
+    """Force X [N] and torque K [N m] of the thruster.
+
+    Parameters
+    ----------
+    command : the thrust [N] that balances the resistance at the commanded speed. Without a table it is the force.
+        With a table it fixes the shaft speed n, and the force follows the table as the craft slows down or speeds up.
+    u : speed of the craft through the water along x [m/s].
+
+    Source     T = (1 - t) rho n|n| D^4 KT(J), J = (1 - w) u / (n D), K = -+ rho n|n| D^5 KQ(J) (THEORY section 6).
+    Valid      Ahead; beyond its ends the table is held.
+    """
+    if screw is None:
+        return command, 0.0
+    square = command / screw.force_per_square
+    n = ops.sqrt(ops.fabs(square) + _FORCE_FLOOR)
+    sense = square / (n * n)
+    J = (1.0 - screw.wake) * u * sense / (n * screw.diameter)
+    head = screw.density * square * screw.diameter**4
+    force = (1.0 - screw.deduction) * head * interpolate(J, screw.advance, screw.kt, ops)
+    torque = screw.torque * head * screw.diameter * interpolate(J, screw.advance, screw.kq, ops)
+    return force, torque
+
+
+def shaft_speed(screw: Screw, command: float) -> float:
+    """Shaft speed n [rev/s] that goes with the thrust ``command`` [N]; negative astern."""
+    return float(np.sign(command) * np.sqrt(abs(command) / screw.force_per_square))
