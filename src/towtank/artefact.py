@@ -64,7 +64,12 @@ def write_json(path: Path, document: Mapping[str, Any]) -> Path:
     """Write a JSON document that has a ``schema`` key. NaN and infinity are written as null."""
     if "schema" not in document:
         raise ValueError("a document needs a schema")
-    return write_text(path, json.dumps(_jsonable(document), indent=1, allow_nan=False) + "\n")
+    return write_text(path, json_text(document))
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """``document`` as JSON text with a line end. NaN and infinity become null, arrays lists."""
+    return json.dumps(_jsonable(document), indent=1, allow_nan=False) + "\n"
 
 
 def _jsonable(value: Any) -> Any:

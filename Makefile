@@ -1,0 +1,56 @@
+# make run      set up, then the whole chain for the library craft "hokie"
+# make test     set up, then lint, types, layers and tests
+# make help     the other targets
+# Needs python3 (3.11 or newer), gcc and make. Everything is installed into .venv/.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+JOBS   ?= $(shell nproc 2>/dev/null || echo 2)
+OUT    ?= hokie
+
+.PHONY: help install run test lint bench validate clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make install   the package into $(VENV)/; the command is $(BIN)/towtank"
+	@echo "make run       towtank run hokie, results in ./$(OUT)"
+	@echo "make test      ruff, mypy, import-linter, pytest"
+	@echo "make lint      the first three of these"
+	@echo "make validate  the longer checks (pytest -m validate)"
+	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
+	@echo "make clean     remove $(VENV)/, caches and bench/"
+
+install: $(VENV)/.installed
+
+$(VENV)/.installed: pyproject.toml .ci/venv.sh
+	bash .ci/venv.sh "$(PYTHON)" "$(VENV)"
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/.tools: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --group dev
+	@touch $@
+
+run: $(VENV)/.installed
+	$(BIN)/towtank run hokie --out "$(OUT)"
+
+lint: $(VENV)/.tools
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint
+	$(BIN)/pytest -m "not validate" -n $(JOBS)
+
+validate: $(VENV)/.tools
+	$(BIN)/pytest -m validate
+
+bench: $(VENV)/.installed
+	$(BIN)/python benchmarks/bench.py
+
+clean:
+	rm -rf $(VENV) bench build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,50 @@
+"""The command ``towtank`` and its sub-commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from towtank.cli.assess import assess
+from towtank.cli.check import check
+from towtank.cli.derive import derive
+from towtank.cli.doctor import doctor
+from towtank.cli.new import new
+from towtank.cli.plan import plan
+from towtank.cli.report import report
+from towtank.cli.run import run
+from towtank.cli.status import status
+from towtank.cli.tow import tow
+from towtank.cli.trial import trial
+from towtank.provenance import VERSION
+
+app = typer.Typer(
+    name="towtank",
+    help="From the shape of a slender underwater craft to a manoeuvring model. Start with: towtank run hokie",
+    epilog="Exit codes: 0 done, 2 bad input, 3 a stage failed, 130 stopped by Ctrl-C.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"towtank {VERSION}")
+        raise typer.Exit()
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and exit.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Options before the command; ``--version`` acts in its callback."""
+
+
+for _command in (run, new, check, plan, tow, status, derive, trial, assess, report, doctor):
+    app.command()(_command)

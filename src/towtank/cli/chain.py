@@ -1,0 +1,282 @@
+"""The stages of a study in order, each done once: what goes in is hashed, what is done is kept."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from towtank.cli.reply import Reply
+from towtank.cli.study import Study, file_hash, program_hash
+from towtank.errors import ArtefactError, InputError
+from towtank.provenance import digest
+
+if TYPE_CHECKING:
+    from towtank.craft.craft import Craft
+    from towtank.derive.table import Derivatives
+    from towtank.model.equations import Model
+    from towtank.plan.kinds import Plan
+    from towtank.tank.run import Run
+    from towtank.tank.tank import Tank
+    from towtank.trials.trajectory import Trajectory
+    from towtank.verdict.assess import Verdict
+
+STAGES = ("craft", "plan", "tow", "derive", "trials", "verdict", "report")
+
+
+def open_chain(reply: Reply, craft: str | None, out: Path | None, speed: str | None = None) -> Chain:
+    """The chain of a study: from a library name, a craft file, a study folder, or nothing when ``out`` is one.
+
+    Raises
+    ------
+    InputError
+        No craft is named and there is no study folder to take it from.
+    """
+    from towtank.craft.library import read_craft
+
+    named = Path(craft) if craft is not None else (out or Path())
+    inside = (named / "craft.toml").is_file()
+    if craft is None and not inside:
+        raise InputError(f"{named.resolve()} holds no craft.toml. Name a craft, or a study folder with --out DIR.")
+    source = str(named / "craft.toml") if inside else str(craft)
+    read = read_craft(source)
+    if inside:
+        reply.log(f"craft from {source}")
+    study = Study(out or (named if inside else Path(read.name)))
+    reply.file("study", study.root)
+    return Chain(study, read, source, reply, speed)
+
+
+@dataclass
+class Chain:
+    """One study under way. ``speed`` as the user wrote it; None is the craft's own."""
+
+    study: Study
+    craft: Craft
+    source: str
+    reply: Reply
+    speed: str | None = None
+    wall: dict[str, float] = field(default_factory=dict)
+    _runs: tuple[Run, ...] | None = None
+
+    def keep_speed(self) -> Chain:
+        """Take the speed of the plan that the study already holds, when none was given."""
+        if self.speed is None:
+            self.speed = self.study.stages().get("plan", {}).get("inputs", {}).get("speed") or None
+        return self
+
+    def tank(self) -> Tank:
+        """The tank the campaign runs in."""
+        from towtank.tank.fast.tank import FastTank
+
+        return FastTank()
+
+    def inputs(self, stage: str) -> dict[str, str]:
+        """Name -> hash of what ``stage`` depends on, as things stand."""
+        files = {name: digest(record.get("files", {}), 16) for name, record in self.study.stages().items()}
+        study, craft = self.study, {"program": program_hash(), "craft": digest(self.craft, 16)}
+        match stage:
+            case "craft":
+                return craft
+            case "plan":
+                return craft | {"speed": self.speed or ""}
+            case "tow":
+                return craft | {"plan": file_hash(study.plan), "tank": digest(self.tank().settings(), 16)}
+            case "derive":
+                return craft | {"runs": files.get("tow", "")}
+            case "trials":
+                return craft | {"derivatives": file_hash(study.derivatives)}
+            case "verdict":
+                return craft | {"derivatives": file_hash(study.derivatives), "trials": files.get("trials", "")}
+        known = ("plan", "tow", "derive", "trials", "verdict")
+        return craft | {name: files.get(name, "") for name in known}
+
+    def done(self, stage: str) -> bool:
+        """True when ``stage`` need not be done again."""
+        return self.study.current(stage, self.inputs(stage))
+
+    def _do(self, stage: str, work: Callable[[], Sequence[Path]]) -> None:
+        if self.done(stage):
+            self.reply.log(f"{stage:<8} already done")
+            return
+        started = time.perf_counter()
+        inputs = self.inputs(stage)
+        files = work()
+        wall = time.perf_counter() - started
+        self.study.record(stage, inputs, files, wall)
+        self.wall[stage] = round(wall, 3)
+        self.reply.log(f"{stage:<8} {wall:6.1f} s")
+
+    def _replacing(self, path: Path) -> Path:
+        aside = self.study.put_aside(path)
+        if aside is not None:
+            self.reply.log(f"{path} was edited since it was written; the edited file is kept as {aside.name}")
+        return path
+
+    def prepare(self) -> None:
+        """Put the craft file and its solid into the study folder."""
+        self._do("craft", self._write_craft)
+        self.reply.file("craft", self.study.craft)
+
+    def _write_craft(self) -> Sequence[Path]:
+        from towtank.craft.library import craft_text, write_craft_copy
+        from towtank.craft.solid import write_glb, write_stl
+
+        own = self.study.craft
+        if Path(self.source) != own:
+            if self.study.edited(own) and own.read_text(encoding="utf-8") != craft_text(self.source):
+                raise InputError(
+                    f"{own} is not the craft {self.source} and was not copied from it. To use it: towtank run "
+                    f"{self.study.root}. To start from {self.source}, move it away or choose another folder with --out."
+                )
+            write_craft_copy(self.source, self.study.root)
+        stl, glb = (self.study.root / f"{self.craft.name}.{kind}" for kind in ("stl", "glb"))
+        write_stl(self.craft, stl)
+        write_glb(self.craft, glb)
+        return own, stl, glb
+
+    def make_plan(self) -> None:
+        """Lay out the captive tests, unless the user edited the plan of the study: then that one holds."""
+        if self.study.edited(self.study.plan):
+            self.plan()
+            self.reply.log(f"plan     edited by hand, used as it is (remove {self.study.plan} for the standard one)")
+        else:
+            self._do("plan", self._write_plan)
+        self.reply.file("plan", self.study.plan)
+
+    def _write_plan(self) -> Sequence[Path]:
+        from towtank.plan.files import write_plan
+        from towtank.plan.standard import standard_plan
+
+        plan = standard_plan(self.craft, self.speed)
+        for note in plan.notes:
+            self.reply.log(f"  note: {note}")
+        write_plan(plan, self.study.root)
+        return self.study.plan, self.study.root / "plan.csv"
+
+    def plan(self) -> Plan:
+        """The captive tests of the study."""
+        from towtank.plan.files import read_plan
+
+        return read_plan(self.study.plan, self.craft)
+
+    def tow(self) -> None:
+        """Run the captive tests that are not done yet."""
+        self.reply.kept = f"Finished runs are kept in {self.study.runs}."
+        self._do("tow", self._tow)
+        self.reply.file("runs", self.study.runs)
+        self.reply.kept = f"What is done is kept in {self.study.root}."
+
+    def _tow(self) -> Sequence[Path]:
+        from towtank.tank.files import run_path
+
+        return [run_path(self.study.root, run.id) for run in self.runs()]
+
+    def runs(self) -> tuple[Run, ...]:
+        """The runs of the plan, or of the runs folder when the study has no plan."""
+        from towtank.tank.campaign import tow
+        from towtank.tank.files import read_runs
+
+        if self._runs is None:
+            if self.study.plan.exists():
+                self._runs = tow(self.plan(), self.tank(), self.study.root, self.reply.progress)
+            elif self.study.runs.is_dir():
+                self._runs = tuple(read_runs(self.study.runs))
+            else:
+                raise ArtefactError(f"{self.study.root} has no plan and no runs. First: towtank tow {self.source}")
+        return self._runs
+
+    def derive(self) -> None:
+        """Derivatives and model from the runs."""
+        self._do("derive", self._derive)
+        self.reply.file("derivatives", self.study.derivatives)
+        self.reply.file("model", self.study.model)
+
+    def _derive(self) -> Sequence[Path]:
+        from towtank.derive.derive import derive
+        from towtank.derive.files import write_derivatives
+
+        derived = derive(self.runs())
+        write_derivatives(derived, self._replacing(self.study.derivatives))
+        return self.study.derivatives, self.write_model()
+
+    def write_model(self) -> Path:
+        """Write the self-contained model."""
+        from towtank.model.files import write_model
+
+        write_model(self.model(), self.study.model)
+        return self.study.model
+
+    def derivatives(self) -> Derivatives:
+        """The derivatives of the study, from whatever source."""
+        from towtank.derive.files import read_derivatives
+
+        if not self.study.derivatives.exists():
+            raise ArtefactError(f"{self.study.derivatives} does not exist. First: towtank derive {self.source}")
+        return read_derivatives(self.study.derivatives)
+
+    def model(self) -> Model:
+        """The model of the craft with the derivatives of the study."""
+        from towtank.model.equations import Model
+
+        return Model(self.craft, self.derivatives())
+
+    def try_out(self) -> None:
+        """The standard trials."""
+        self._do("trials", self._trials)
+        self.reply.file("trials", self.study.trials)
+
+    def _trials(self) -> Sequence[Path]:
+        from towtank.trials.standard import standard_trials
+
+        return self.write_trials(standard_trials(self.model()))
+
+    def write_trials(self, trajectories: Sequence[Trajectory]) -> Sequence[Path]:
+        """Write trials and the index of all that the folder holds."""
+        from towtank.trials.files import write_index, write_trajectory
+
+        folder = self.study.trials
+        for item in trajectories:
+            write_trajectory(item, folder / f"{item.name}.nc")
+        names = {item.name for item in trajectories}
+        others = [item for item in self.trajectories() if item.name not in names]
+        write_index((*trajectories, *others), folder / "index.json")
+        return [folder / "index.json", *(folder / f"{item.name}.nc" for item in trajectories)]
+
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        """The trials that the study holds."""
+        from towtank.trials.files import read_trajectory
+
+        return tuple(read_trajectory(path) for path in sorted(self.study.trials.glob("*.nc")))
+
+    def judge(self) -> None:
+        """The verdict."""
+        self._do("verdict", self._judge)
+        self.reply.file("verdict", self.study.verdict)
+
+    def _judge(self) -> Sequence[Path]:
+        from towtank.verdict.assess import assess
+        from towtank.verdict.files import write_verdict
+
+        write_verdict(assess(self.model(), self.trajectories()), self._replacing(self.study.verdict))
+        return (self.study.verdict,)
+
+    def verdict(self) -> Verdict:
+        """The verdict of the study."""
+        from towtank.verdict.files import read_verdict
+
+        return read_verdict(self.study.verdict)
+
+    def publish(self) -> None:
+        """The report of everything the study holds."""
+        self._do("report", self._publish)
+        self.reply.file("report", self.study.report)
+
+    def _publish(self) -> Sequence[Path]:
+        from towtank.report.build import report
+
+        things: list[object] = [self.craft]
+        report(self.study.report, *things)
+        return (self.study.report,)

@@ -1,0 +1,29 @@
+"""``towtank run``: the whole chain."""
+
+from __future__ import annotations
+
+from towtank.cli.chain import open_chain
+from towtank.cli.options import CraftArgument, Debug, Json, Out, Speed
+from towtank.cli.reply import answering
+
+
+def run(craft: CraftArgument, speed: Speed = None, out: Out = None, json: Json = False, debug: Debug = False) -> None:
+    """Do the whole chain, from craft file to report.
+
+    Captive tests, derivatives, model, trials, verdict and report go into the study folder.
+    Stages that are done with the same inputs are not repeated; after Ctrl-C the same command resumes.
+
+    Example: towtank run hokie
+    """
+    with answering("run", json, debug) as reply:
+        chain = open_chain(reply, craft, out, speed)
+        chain.prepare()
+        chain.make_plan()
+        chain.tow()
+        chain.derive()
+        chain.try_out()
+        chain.judge()
+        chain.publish()
+        verdict = chain.verdict()
+        reply.summary |= {"craft": chain.craft.name, "stages_s": chain.wall, "words": verdict.words}
+        reply.say(f"\n{verdict.words}\n\nReport: {chain.study.report}")
