@@ -1,4 +1,4 @@
-"""From a craft to what the load functions need: panels solved, boundary layer marched, fins measured. Cached by craft."""
+"""From a craft to what the load functions need: panels solved, boundary layer marched, fins measured."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from towtank.craft.craft import Craft
+from towtank.craft.integrals import hull_integrals
 from towtank.frames import Array, body_x
 from towtank.tank.fast.boundary import WAKE_STATION, BoundaryLayer, march, wake_factor
 from towtank.tank.fast.fins import FinData, fin_data
@@ -30,24 +31,24 @@ class Build:
     panels: int
 
 
-def wetted_area(craft: Craft) -> float:
-    """Wetted area of the bare hull [m2]."""
-    x = np.linspace(0.0, craft.length, 4001)
-    r = craft.profile.radius(x)
-    return float(np.sum(np.pi * (r[1:] + r[:-1]) * np.hypot(np.diff(x), np.diff(r))))
-
-
 @functools.lru_cache(maxsize=8)
-def build(craft: Craft, speed: float) -> Build:
-    """Solve the craft at its design ``speed`` [m/s]. About a second; kept for the last eight crafts."""
+def _solved(craft: Craft) -> tuple[HullFlow, Array]:
+    """Potential flow of hull and fins; it knows no speed."""
     flow = hull_flow(craft)
+    return flow, added_mass_with_fins(craft, flow)
+
+
+@functools.lru_cache(maxsize=32)
+def build(craft: Craft, speed: float) -> Build:
+    """Solve the craft at the ``speed`` [m/s] of a test. About a second for a new craft; then kept."""
+    flow, added = _solved(craft)
     length = craft.length
     design = craft.water.reynolds(speed, length)
     reynolds = np.append(REYNOLDS_RANGE, 1.0) * design
     layer = march(craft.profile.radius, length, reynolds, flow.panels.station, flow.surface_speed)
     astern = _march_astern(craft, flow, design)
     fins = tuple(_fin(craft, layer, index, speed) for index in range(len(craft.fins)))
-    hull = _hull(craft, flow, layer, astern, reynolds)
+    hull = _hull(craft, flow, added, layer, astern, reynolds)
     return Build(hull, fins, layer, design, int(np.prod(flow.panels.shape)))
 
 
@@ -67,18 +68,19 @@ def _fin(craft: Craft, layer: BoundaryLayer, index: int, speed: float) -> FinDat
     return fin_data(craft, fin, wake_factor(layer, fin, -1), friction)
 
 
-def _hull(craft: Craft, flow: HullFlow, layer: BoundaryLayer, astern: BoundaryLayer, reynolds: Array) -> HullData:
+def _hull(
+    craft: Craft, flow: HullFlow, added: Array, layer: BoundaryLayer, astern: BoundaryLayer, reynolds: Array
+) -> HullData:
     length, origin = craft.length, craft.origin_from_nose
     edge = np.linspace(0.0, length, STRIPS + 1)
     middle = 0.5 * (edge[1:] + edge[:-1])
-    added = added_mass_with_fins(craft, flow)
     return HullData(
         density=craft.water.density,
         viscosity=craft.water.kinematic_viscosity,
         length=length,
         largest=craft.diameter,
         bow=origin,
-        wetted=wetted_area(craft),
+        wetted=hull_integrals(craft.profile).wetted_area,
         added=0.5 * (added + added.T),
         added_hull=0.5 * (flow.added_mass + flow.added_mass.T),
         log_reynolds=np.log(reynolds[:-1]),

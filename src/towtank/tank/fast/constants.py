@@ -6,7 +6,10 @@ uncertainty. Constants with ``fitted_on`` empty come from the named source and a
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import norm, qmc
@@ -52,15 +55,16 @@ CONSTANTS = (
 NOMINAL: dict[str, float] = {item.name: item.value for item in CONSTANTS}
 
 
-def sample(members: int, seed: int = 0) -> dict[str, Array]:
+@functools.lru_cache(maxsize=4)
+def sample(members: int, seed: int = 0) -> Mapping[str, Array]:
     """Constants (members + 1,): the nominal set first, then a scrambled Sobol sample of the distributions."""
     values = {item.name: np.full(members + 1, item.value) for item in CONSTANTS}
     if members == 0:
-        return values
+        return MappingProxyType(values)
     points = 2 ** int(np.ceil(np.log2(members)))
     unit = qmc.Sobol(len(CONSTANTS), seed=seed).random(points)[:members]
     normal = norm.ppf(np.clip(unit, 1e-6, 1 - 1e-6))
     for item, z in zip(CONSTANTS, normal.T, strict=True):
         drawn = item.value + item.spread * z if item.additive else item.value * np.exp(item.spread * z)
         values[item.name][1:] = np.clip(drawn, *item.limits)
-    return values
+    return MappingProxyType(values)

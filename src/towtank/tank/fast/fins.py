@@ -12,7 +12,7 @@ import numpy as np
 
 from towtank.craft.craft import Craft, Fin
 from towtank.frames import Array, body_x
-from towtank.tank.fast.record import Record
+from towtank.tank.fast.motion import MotionRecord
 
 SIDEWASH_LAG = 0.45
 """Travel in lengths from where the upstream cross-flow is read to the fins (half the hull, by geometry)."""
@@ -137,7 +137,7 @@ def section_forces(angle: Array, data: FinData, p: Mapping[str, Array]) -> tuple
     return normal, np.where(reversed_, -suction, suction)
 
 
-def fin_load(data: FinData, record: Record, index: int, upstream: Array, p: Mapping[str, Array]) -> Array:
+def fin_load(data: FinData, record: MotionRecord, index: int, upstream: Array, p: Mapping[str, Array]) -> Array:
     """Load (m, N, 6) of one fin and of what it carries over to the hull.
 
     Parameters
@@ -188,7 +188,9 @@ def _at(fx: Array, fl: Array, arm: Array, lift: Array) -> Array:
     return np.stack([fx, fy, fz, ay * fz - az * fy, az * fx - ax * fz, ax * fy - ay * fx], axis=-1)
 
 
-def fins_load(fins: tuple[FinData, ...], record: Record, length: float, bow: float, p: Mapping[str, Array]) -> Array:
+def fins_load(
+    fins: tuple[FinData, ...], record: MotionRecord, length: float, bow: float, p: Mapping[str, Array]
+) -> Array:
     """Load (m, N, 6) of all fins. The upstream cross-flow is read half-way between bow and fins."""
     members = len(p["sidewash"])
     total = np.zeros((members, len(record.time), 6))

@@ -6,10 +6,10 @@ import numpy as np
 
 from towtank.tank.fast.build import Build
 from towtank.tank.fast.fins import STALL_ANGLE, STALL_ASPECT
-from towtank.tank.fast.record import Record
+from towtank.tank.fast.motion import MotionRecord
 
 
-def flags(body: Build, record: Record) -> tuple[str, ...]:
+def flags(body: Build, record: MotionRecord) -> tuple[str, ...]:
     """Short sentences, each with the limit that is passed; empty when nothing is."""
     return tuple([*_shape_flags(body), *_motion_flags(body, record)])
 
@@ -33,7 +33,7 @@ def _shape_flags(body: Build) -> list[str]:
     return found
 
 
-def _motion_flags(body: Build, record: Record) -> list[str]:
+def _motion_flags(body: Build, record: MotionRecord) -> list[str]:
     u = record.nu[:, 0]
     cross = np.hypot(record.nu[:, 1], record.nu[:, 2])
     angle = float(np.degrees(np.arctan2(cross, np.maximum(u, 1e-12)).max()))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from towtank.frames import Array
-from towtank.tank.fast.record import Record, slip
+from towtank.tank.fast.motion import MotionRecord, slip
 
 ASTERN_DRAG = 1.6
 """Drag going astern over drag going ahead: blunt end trailing (hoerner1965; judgement, factor 1.3-2)."""
@@ -61,7 +61,7 @@ def finite_length_factor(slenderness: float) -> float:
     )
 
 
-def inertia(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
+def inertia(hull: HullData, record: MotionRecord, p: Mapping[str, Array]) -> Array:
     """Load -M_A nudot (m, N, 6) of hull and fins in potential flow.
 
     Source     lamb1932, chapter 6.
@@ -69,7 +69,7 @@ def inertia(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
     return -hull.density * p["added_mass"][:, None, None] * (record.nudot @ hull.added)
 
 
-def kirchhoff(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
+def kirchhoff(hull: HullData, record: MotionRecord, p: Mapping[str, Array]) -> Array:
     """Load (m, N, 6) of the bare hull's added momentum carried along: [-w x P; -w x H - v x P]. It does no work.
 
     Source     lamb1932, section 124 (Kirchhoff). The fins' circulation is in the fin loads, so their added mass
@@ -82,14 +82,14 @@ def kirchhoff(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
     return np.asarray(p["added_mass"][:, None, None] * load)
 
 
-def tail_lift(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
+def tail_lift(hull: HullData, record: MotionRecord, p: Mapping[str, Array]) -> Array:
     """Load (m, N, 6) of the lateral momentum shed into the boundary layer at the stern.
 
     F = -rho A_e |u| v_t at the downstream end, v_t the cross-flow there a short travel ago. The shed area is
     A_e = tail_area (2 pi r theta)_max (1 + tail_growth |sin|): the layer gathers on the lee side as the tail is
     inclined.
 
-    Source     Slender-body reasoning of Hopkins (NACA RM A51C14) with the area left at the tail taken from the boundary layer.
+    Source     Slender-body reasoning of Hopkins (NACA RM A51C14); the area left at the tail is that of the layer.
     Departure  The area follows the momentum area of the layer, so it depends on Reynolds number, and works astern.
     Valid      Set on SUBOFF, Re 1.4e7, drift to 18 deg.
     """
@@ -107,7 +107,7 @@ def tail_lift(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
     return np.stack([zero, fy, fz, zero, -x * fz, x * fy], axis=-1)
 
 
-def crossflow(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
+def crossflow(hull: HullData, record: MotionRecord, p: Mapping[str, Array]) -> Array:
     """Load (m, N, 6) of the separated cross-flow, strip by strip, growing as each water slice is displaced.
 
     dF = -1/2 rho Cd eta d |v_c| v_c (1 - exp(-(xi/xi_0)^2)) dx, xi the slip in diameters since the slice met the bow:
@@ -138,7 +138,7 @@ def crossflow(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
     return np.stack([fx, summed[..., 1], summed[..., 2], zero, summed[..., 3], summed[..., 4]], axis=-1)
 
 
-def axial_drag(hull: HullData, record: Record, p: Mapping[str, Array]) -> Array:
+def axial_drag(hull: HullData, record: MotionRecord, p: Mapping[str, Array]) -> Array:
     """Load (m, N, 6) of skin friction and form drag along x, and of the hull's friction in roll.
 
     X = -1/2 rho (CD S)(Re) V u: friction acts along the flow, V being the speed of the body through the water.

@@ -11,7 +11,7 @@ CORE = 1e-4
 
 
 def panel_geometry(quads: Array) -> tuple[Array, Array, Array]:
-    """Centre (m, 3) [m], unit normal (m, 3) and area (m,) [m2] of quadrilaterals (m, 4, 3); normal by the right hand."""
+    """Centre (m, 3) [m], right-handed unit normal (m, 3) and area (m,) [m2] of quadrilaterals (m, 4, 3)."""
     cross = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
     twice = np.linalg.norm(cross, axis=1)
     return quads.mean(axis=1), cross / twice[:, None], 0.5 * twice
@@ -65,7 +65,7 @@ def source_influence(points: Array, quads: Array, normals: Array) -> tuple[Array
 
 
 def ring_velocity(points: Array, rings: Array) -> Array:
-    """Velocity (n, m, 3) at ``points`` (n, 3) of unit vortex rings (m, 4, 3); the potential jumps by +1 along the normal.
+    """Velocity (n, m, 3) at ``points`` (n, 3) of unit vortex rings (m, 4, 3); phi jumps by +1 along the normal.
 
     Source     katzplotkin2001, section 2.12 and chapter 12 (Biot-Savart for straight segments).
     """

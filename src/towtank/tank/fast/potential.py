@@ -22,7 +22,7 @@ CHORDWISE, SPANWISE = 5, 6
 
 @dataclass(frozen=True)
 class HullPanels:
-    """Panels of a body of revolution; arrays (rings, sectors, ...). Body axes [m]; ``station`` (rings,) from the nose."""
+    """Panels of a body of revolution: arrays (rings, sectors, ...), body axes; ``station`` (rings,) from the nose."""
 
     quads: Array
     centre: Array
@@ -85,7 +85,7 @@ def unit_normal_velocity(centre: Array, normal: Array) -> Array:
 
 @dataclass(frozen=True)
 class HullFlow:
-    """The solved hull. ``potential`` and ``velocity`` are of one sector of control points, every panel a unit source."""
+    """The solved hull; ``potential`` and ``velocity`` at one sector of control points, each panel a unit source."""
 
     panels: HullPanels
     potential: Array
@@ -102,14 +102,14 @@ class HullFlow:
         rings, sectors = self.panels.shape
         harmonics = np.fft.rfft(normal.reshape(rings, sectors, -1), axis=1)
         solved = np.stack([scipy.linalg.lu_solve(lu, harmonics[:, k]) for k, lu in enumerate(self._modes)], axis=1)
-        return np.fft.irfft(solved, n=sectors, axis=1)
+        return np.asarray(np.fft.irfft(solved, n=sectors, axis=1))
 
     def surface_potential(self, density: Array) -> Array:
         """Potential (rings, sectors, c) on the panels of source densities (rings, sectors, c)."""
         sectors = self.panels.shape[1]
         kernel = np.fft.rfft(self.potential, axis=2).conj()
         harmonics = np.fft.rfft(density, axis=1)
-        return np.fft.irfft(np.einsum("ijk,jkc->ikc", kernel, harmonics), n=sectors, axis=1)
+        return np.asarray(np.fft.irfft(np.einsum("ijk,jkc->ikc", kernel, harmonics), n=sectors, axis=1))
 
     @cached_property
     def unit_densities(self) -> Array:
@@ -123,7 +123,7 @@ class HullFlow:
 
     def _integrate(self, density: Array) -> Array:
         rate = unit_normal_velocity(self.panels.centre, self.panels.normal)
-        return -np.einsum("ijr,ij,ijc->rc", rate, self.panels.area, self.surface_potential(density))
+        return np.asarray(-np.einsum("ijr,ij,ijc->rc", rate, self.panels.area, self.surface_potential(density)))
 
     @cached_property
     def surface_speed(self) -> Array:
@@ -231,7 +231,7 @@ def _ring_normal(points: Array, normals: Array, lattice: FinLattice) -> Array:
     chordwise = len(lattice.through)
     velocity = ring_velocity(points, lattice.rings)
     velocity[:, :chordwise] += ring_velocity(points, lattice.through)
-    return np.einsum("ijc,ic->ij", velocity, normals)
+    return np.asarray(np.einsum("ijc,ic->ij", velocity, normals))
 
 
 def _ring_potential(points: Array, lattice: FinLattice) -> Array:

@@ -11,19 +11,21 @@ import numpy as np
 from towtank.craft.craft import Craft
 from towtank.frames import Array
 from towtank.plan.kinds import CaptiveTest
+from towtank.plan.motion import sampled
 from towtank.progress import Progress
 from towtank.tank.fast import fins, hull
 from towtank.tank.fast.build import Build, build
 from towtank.tank.fast.constants import NOMINAL, sample
 from towtank.tank.fast.flags import flags
-from towtank.tank.fast.record import Record, record_of
+from towtank.tank.fast.motion import MotionRecord, record_of
+from towtank.tank.record import record
 from towtank.tank.run import Run
 
 LEVEL = "semi-empirical"
 MEMORY_TRAVEL = 1.3
 """Lead-in before a test, in lengths travelled: the longest memory is one length."""
 
-Part = Callable[[hull.HullData, Record, Mapping[str, Array]], Array]
+Part = Callable[[hull.HullData, MotionRecord, Mapping[str, Array]], Array]
 HULL_PARTS: dict[str, Part] = {
     "inertia": hull.inertia,
     "kirchhoff": hull.kirchhoff,
@@ -66,51 +68,39 @@ class FastTank:
 
     def run(self, craft: Craft, test: CaptiveTest, progress: Progress) -> Run:
         """Run one captive test. Loads about the body origin, with parts, ensemble and validity flags."""
-        from towtank.tank.identity import run_id
-
         body = build(craft, test.speed)
-        record = self._record(craft, test)
-        parts = self.part_loads(body, record)
-        kept = slice(record.lead, None)
-        total = sum(parts.values())[:, kept]
-        history = test.motion.history(_times(test))
-        fin_angles = np.broadcast_to(_fins(craft, test), (len(history.time), len(craft.fins)))
-        return Run(
-            id=run_id(craft, test, self.settings()), name=test.name, kind=test.kind, craft=craft.name,
-            symmetry=craft.symmetry, level=self.level, speed=test.speed, period=test.motion.period,
-            periods=test.periods if test.motion.period else 1, density=craft.water.density, length=craft.length,
-            origin_from_nose=craft.origin_from_nose, history=history, delta=np.array(fin_angles),
-            control=craft.virtual(fin_angles), loads=total[0],
+        motion = self._record(craft, test)
+        parts = self.part_loads(body, motion)
+        kept = slice(motion.lead, None)
+        total = np.sum(list(parts.values()), axis=0)[:, kept]
+        return record(
+            self,
+            craft,
+            test,
+            sampled(test),
+            total[0],
             parts={name: load[0, kept] for name, load in parts.items()},
             ensemble=total[1:] if self.members else None,
-            flags=flags(body, record) if self.parts == "all" else ("potential part only",),
-            exploratory=test.exploratory, provenance={"tank": self.settings()},
-        )  # fmt: skip
+            flags=flags(body, motion) if self.parts == "all" else ("potential part only",),
+        )
 
-    def part_loads(self, body: Build, record: Record) -> dict[str, Array]:
+    def part_loads(self, body: Build, record: MotionRecord) -> dict[str, Array]:
         """Shares of the load (members + 1, N, 6), the nominal constants first."""
-        constants = sample(self.members, self.seed)
-        constants["density"] = np.full(self.members + 1, body.hull.density)
+        constants = {**sample(self.members, self.seed), "density": np.full(self.members + 1, body.hull.density)}
         names = POTENTIAL if self.parts == "potential" else tuple(HULL_PARTS)
         loads = {name: HULL_PARTS[name](body.hull, record, constants) for name in names}
         if body.fins and self.parts == "all":
             loads["fins"] = fins.fins_load(body.fins, record, body.hull.length, body.hull.bow, constants)
         return loads
 
-    def _record(self, craft: Craft, test: CaptiveTest) -> Record:
-        times = _times(test)
+    def _record(self, craft: Craft, test: CaptiveTest) -> MotionRecord:
+        times = sampled(test).time
         if not test.motion.period or not self.memory:
             return record_of(test.motion.history(times), 0, _fins(craft, test))
         step = times[1] - times[0]
         lead = int(np.ceil(MEMORY_TRAVEL * craft.length / (test.speed * step)))
         extended = np.concatenate([times[0] - step * np.arange(lead, 0, -1), times])
         return record_of(test.motion.history(extended), lead, _fins(craft, test))
-
-
-def _times(test: CaptiveTest) -> Array:
-    if not test.motion.period:
-        return np.array([0.0, 1.0])
-    return np.asarray(np.linspace(0.0, test.periods * test.motion.period, test.periods * test.samples + 1))
 
 
 def _fins(craft: Craft, test: CaptiveTest) -> Array:

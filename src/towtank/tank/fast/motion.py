@@ -12,7 +12,7 @@ from towtank.plan.history import History
 
 
 @dataclass(frozen=True)
-class Record:
+class MotionRecord:
     """Samples (N,) of which the first ``lead`` lie before the test begins; they feed the memory and are not reported.
 
     nu, nudot (N, 6); delta (N, n_fins) [rad].
@@ -47,11 +47,12 @@ class Record:
         return np.interp(s[None, :] - distance[:, None], s, signal)
 
 
-def slip(record: Record, x: Array, behind_bow: Array) -> tuple[Array, Array]:
+def slip(record: MotionRecord, x: Array, behind_bow: Array) -> tuple[Array, Array]:
     """Lateral displacement (N, k) [m], along y and z, of the hull section at ``x`` through the water slice it cuts.
 
     A slice is met by the bow and then passed by the sections in turn; the slip is what it has been displaced,
-    relative to the hull, since. In steady drift it is tan(beta) times the distance behind the bow.
+    relative to the hull, since. In steady drift it is tan(beta) times the distance behind the bow; in a steady turn
+    the arm is the mean between where the slice was met and where it is.
 
     Parameters
     ----------
@@ -59,8 +60,9 @@ def slip(record: Record, x: Array, behind_bow: Array) -> tuple[Array, Array]:
     """
     u, v, w, _, q, r = record.nu.T
     if not record.remembers:
-        ahead = np.maximum(np.abs(u), 1e-9)[:, None]
-        return (v[:, None] + x * r[:, None]) * behind_bow / ahead, (w[:, None] - x * q[:, None]) * behind_bow / ahead
+        spent = behind_bow / np.maximum(np.abs(u), 1e-9)[:, None]
+        arm = x + 0.5 * np.where(u >= 0.0, 1.0, -1.0)[:, None] * behind_bow
+        return (v[:, None] + arm * r[:, None]) * spent, (w[:, None] - arm * q[:, None]) * spent
     s = record.travelled
     met = s[:, None] - behind_bow
 
@@ -79,7 +81,7 @@ def slip(record: Record, x: Array, behind_bow: Array) -> tuple[Array, Array]:
     return since(v, r, 1.0), since(w, q, -1.0)
 
 
-def record_of(history: History, lead: int, fins: Array) -> Record:
-    """Record of a sampled history; ``fins`` (n_fins,) [rad] are held."""
+def record_of(history: History, lead: int, fins: Array) -> MotionRecord:
+    """MotionRecord of a sampled history; ``fins`` (n_fins,) [rad] are held."""
     delta = np.broadcast_to(fins, (len(history.time), len(fins)))
-    return Record(history.time, history.nu, history.nudot, delta, lead)
+    return MotionRecord(history.time, history.nu, history.nudot, delta, lead)
