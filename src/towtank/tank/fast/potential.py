@@ -6,7 +6,7 @@ sector of control points gives all of it, and it is solved one azimuthal harmoni
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -202,29 +202,69 @@ def added_mass_with_fins(craft: Craft, flow: HullFlow) -> Array:
 
     The hull unknowns are eliminated harmonic by harmonic; a dense system is left for the fins.
     """
-    lattices = [fin_lattice(craft, fin) for fin in craft.fins]
-    if not lattices:
+    if not craft.fins:
         return flow.added_mass
+    lattices = [fin_lattice(craft, fin) for fin in craft.fins]
     panels = flow.panels
     rings, sectors = panels.shape
-    hull_points, hull_normals = panels.centre.reshape(-1, 3), panels.normal.reshape(-1, 3)
+    meetings = _meetings(craft.fins, lattices, panels)
+    to_fin = np.concatenate([item.to_fin for item in meetings], axis=2).reshape(rings * sectors, -1).T
+    on_hull = np.concatenate([item.on_hull for item in meetings], axis=2)
     points = np.concatenate([item.point for item in lattices])
     normals = np.concatenate([item.normal for item in lattices])
-    to_fin = source_influence(points, panels.quads.reshape(-1, 4, 3), hull_normals)[1]
-    to_fin_normal = np.einsum("ijc,ic->ij", to_fin, normals)
-    on_hull = np.concatenate([_ring_normal(hull_points, hull_normals, item) for item in lattices], axis=1)
     on_fin = np.concatenate([_ring_normal(points, normals, item) for item in lattices], axis=1)
     fin_rate = unit_normal_velocity(points, normals)
-    response = flow.solve(on_hull.reshape(rings, sectors, -1)).reshape(rings * sectors, -1)
+    response = flow.solve(on_hull).reshape(rings * sectors, -1)
     free = flow.unit_densities.reshape(rings * sectors, 6)
-    circulation = np.linalg.solve(on_fin - to_fin_normal @ response, fin_rate - to_fin_normal @ free)
+    circulation = np.linalg.solve(on_fin - to_fin @ response, fin_rate - to_fin @ free)
     density = (free - response @ circulation).reshape(rings, sectors, 6)
-    potential = flow.surface_potential(density).reshape(-1, 6)
-    potential += np.concatenate([_ring_potential(hull_points, item) for item in lattices], axis=1) @ circulation
-    hull_rate = unit_normal_velocity(hull_points, hull_normals)
-    added = -(hull_rate * panels.area.reshape(-1, 1)).T @ potential
+    potential = flow.surface_potential(density)
+    potential += np.concatenate([item.potential for item in meetings], axis=2) @ circulation
+    hull_rate = unit_normal_velocity(panels.centre, panels.normal)
+    added = -np.einsum("ijr,ij,ijc->rc", hull_rate, panels.area, potential)
     area = np.concatenate([item.area for item in lattices])
     return np.asarray(added + (fin_rate * area[:, None]).T @ circulation)
+
+
+@dataclass(frozen=True)
+class _Meeting:
+    """Influence between the hull panels and one fin, arrays (rings, sectors, fin panels).
+
+    to_fin : normal velocity on the fin by unit sources.   on_hull, potential : on the hull by unit vortex rings.
+    """
+
+    to_fin: Array
+    on_hull: Array
+    potential: Array
+
+    def turned(self, sectors: int) -> _Meeting:
+        """The same for the fin turned about the axis by a whole number of sectors."""
+        return _Meeting(*(np.roll(item, sectors, axis=1) for item in (self.to_fin, self.on_hull, self.potential)))
+
+
+def _meetings(fins: tuple[Fin, ...], lattices: list[FinLattice], panels: HullPanels) -> list[_Meeting]:
+    """Influence for every fin; equal fins a whole number of sectors apart are computed once and turned."""
+    step = 2.0 * np.pi / panels.shape[1]
+    known: dict[Fin, tuple[float, _Meeting]] = {}
+    found = []
+    for fin, lattice in zip(fins, lattices, strict=True):
+        shape = replace(fin, name="", azimuth=0.0)
+        if shape not in known:
+            known[shape] = fin.azimuth, _meet(lattice, panels)
+        azimuth, meeting = known[shape]
+        turn = (fin.azimuth - azimuth) / step
+        whole = round(turn)
+        found.append(meeting.turned(whole) if abs(turn - whole) < 1e-9 else _meet(lattice, panels))
+    return found
+
+
+def _meet(lattice: FinLattice, panels: HullPanels) -> _Meeting:
+    hull_points, hull_normals = panels.centre.reshape(-1, 3), panels.normal.reshape(-1, 3)
+    sources = source_influence(lattice.point, panels.quads.reshape(-1, 4, 3), hull_normals)[1]
+    to_fin = np.einsum("ijc,ic->ji", sources, lattice.normal)
+    shape = (*panels.shape, -1)
+    on_hull = _ring_normal(hull_points, hull_normals, lattice)
+    return _Meeting(to_fin.reshape(shape), on_hull.reshape(shape), _ring_potential(hull_points, lattice).reshape(shape))
 
 
 def _ring_normal(points: Array, normals: Array, lattice: FinLattice) -> Array:
