@@ -6,10 +6,10 @@ series. Every document carries ``schema`` and ``provenance``.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +17,8 @@ import numpy as np
 
 from towtank.errors import ArtefactError
 from towtank.frames import Array
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One netCDF variable: dimension names, values, attributes (``units``, ``long_name``)."""
-
-    dims: tuple[str, ...]
-    values: Array
-    attrs: Mapping[str, str] = field(default_factory=dict)
+from towtank.netcdf import Variable as Variable
+from towtank.netcdf import decode, encode
 
 
 def replace_file(path: Path, write: Callable[[Path], None]) -> Path:
@@ -47,7 +40,8 @@ def replace_file(path: Path, write: Callable[[Path], None]) -> Path:
             "with --out DIR, or free some space; files already written are whole."
         ) from error
     finally:
-        part.unlink(missing_ok=True) if os.access(path.parent, os.W_OK) else None
+        with contextlib.suppress(OSError):  # a parent that is a file or read-only has been told above
+            part.unlink(missing_ok=True)
     return path
 
 
@@ -110,22 +104,16 @@ def read_json(path: Path, schema: str) -> dict[str, Any]:
 
 def write_netcdf(path: Path, schema: str, variables: Mapping[str, Variable], attrs: Mapping[str, Any]) -> Path:
     """Write a netCDF-4 file. Attributes that are not text or numbers are stored as JSON text."""
-    import h5netcdf
+    stored = {
+        key: value if isinstance(value, str | int | float) else json.dumps(_jsonable(value))
+        for key, value in attrs.items()
+    }
+    content = encode(variables, {"schema": schema, **stored})
+    return replace_file(path, lambda part: _write_bytes(part, content))
 
-    def write(part: Path) -> None:
-        with h5netcdf.File(part, "w") as file:
-            file.attrs["schema"] = schema
-            for key, value in attrs.items():
-                file.attrs[key] = value if isinstance(value, str | int | float) else json.dumps(_jsonable(value))
-            for name, variable in variables.items():
-                values = np.asarray(variable.values)
-                for dim, size in zip(variable.dims, values.shape, strict=True):
-                    if dim not in file.dimensions:
-                        file.dimensions[dim] = size
-                stored = file.create_variable(name, variable.dims, values.dtype, data=values)
-                stored.attrs.update(dict(variable.attrs))
 
-    return replace_file(path, write)
+def _write_bytes(part: Path, content: bytes) -> None:
+    part.write_bytes(content)
 
 
 def read_netcdf(path: Path, schema: str) -> tuple[dict[str, Variable], dict[str, Any]]:
@@ -136,19 +124,10 @@ def read_netcdf(path: Path, schema: str) -> tuple[dict[str, Variable], dict[str,
     ArtefactError
         Missing, empty, truncated, or another schema.
     """
-    import h5netcdf
-
     if not path.exists():
         raise ArtefactError(f"{path} does not exist. Run the stage that writes it first.")
     try:
-        with h5netcdf.File(path, "r") as file:
-            attrs = {key: file.attrs[key] for key in file.attrs}
-            variables = {
-                name: Variable(
-                    tuple(item.dimensions), np.asarray(item[...]), {k: str(item.attrs[k]) for k in item.attrs}
-                )
-                for name, item in file.variables.items()
-            }
+        variables, attrs = decode(path.read_bytes())
     except (OSError, KeyError, ValueError, RuntimeError) as error:
         raise ArtefactError(
             f"{path} is not a whole netCDF-4 file ({error}). Delete it; its stage will write it again."
