@@ -1,0 +1,112 @@
+"""The regression from choice of terms to covariance: weights found from the data, roll terms gated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from towtank.derive import weights
+from towtank.derive.cycles import Samples, scatter
+from towtank.derive.regress import Fit, block_covariance, solve
+from towtank.derive.select import Choice, choose, independent
+from towtank.derive.system import System, build
+from towtank.errors import DeriveError
+from towtank.frames import Array
+from towtank.tank.run import Run
+
+SIGNIFICANT = 3.0
+"""Standard deviations a gated roll term must reach to enter the model of a craft whose symmetry allows it."""
+
+REPEATED = 0.5
+"""Share of a residual that repeats from period to period above which a run is one block, not each of its periods."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A regression. share, spread, weight (R, 6) : family weight, standard deviation, weight of a sample.
+
+    covariance (n, n) of the nominal unknowns, from ``blocks`` blocks of the kind ``unit``.
+    gated : roll term -> value, std, in_model, why.
+    """
+
+    choice: Choice
+    system: System
+    share: Array
+    spread: Array
+    weight: Array
+    fit: Fit
+    covariance: Array
+    blocks: int
+    unit: str
+    gated: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+def identify(runs: Sequence[Run], samples: Samples, weight_steady: float) -> Solved:
+    """Choose the terms, weigh the runs by what is left of a first unweighted fit, solve, and gate the roll terms.
+
+    Raises
+    ------
+    DeriveError
+        The runs excite nothing, or ``weight_steady`` is outside 0..1.
+    """
+    choice = choose(runs, samples)
+    if not choice.unknowns:
+        raise DeriveError(
+            "derive: the runs excite no term of the model. Give runs with speed, drift or an oscillation."
+        )
+    system = build(samples, choice)
+    scale = weights.load_scale(system)
+    kept, reasons = independent(system.matrix / scale[system.load][:, None], system.names)
+    choice, system = choice.keep([system.names[i] for i in kept], reasons), system.keep(kept)
+    first = solve(system, 1.0 / (system.count[:, None] * scale**2))
+    spread = weights.spread(system, runs, first.unknowns[:, 0])
+    share = weights.family(system, runs, weight_steady)
+    solved = weighted(samples, choice, system, spread, share)
+    gated = _gate(solved, runs[0].symmetry)
+    out = {name: str(entry["why"]) for name, entry in gated.items() if not entry["in_model"]}
+    if out:
+        left = [i for i, name in enumerate(system.names) if name not in out]
+        solved = weighted(samples, choice.keep([system.names[i] for i in left], out), system.keep(left), spread, share)
+    return Solved(**{**vars(solved), "gated": gated})
+
+
+def weighted(samples: Samples, choice: Choice, system: System, spread: Array, share: Array) -> Solved:
+    """Solve with given spread and family weight (R, 6), with the covariance of independent blocks."""
+    weight = share / spread**2
+    fit = solve(system, weight)
+    squares = weight * system.squares(fit.unknowns[:, 0])
+    misfit = float(squares.sum() / (share * system.count[:, None]).sum())
+    whole = _repeats(samples, system, weight, squares)
+    block = system.run if whole else system.run * (int(system.period.max()) + 1) + system.period
+    covariance, blocks = block_covariance(fit, block, misfit)
+    unit = "run" if whole else "run and period"
+    return Solved(choice, system, share, spread, weight, fit, covariance, blocks, unit)
+
+
+def _repeats(samples: Samples, system: System, weight: Array, squares: Array) -> bool:
+    """True when most of the residual is the same in each period, so that periods are no independent witnesses."""
+    period = scatter(samples, len(system.count))
+    seen = np.isfinite(period)
+    residual = float(squares[seen].sum())
+    fresh = float((weight * system.count[:, None] * np.where(seen, period, 0.0))[seen].sum())
+    return residual > 0.0 and 1.0 - fresh / residual > REPEATED
+
+
+def _gate(solved: Solved, symmetry: str) -> dict[str, dict[str, Any]]:
+    """Value and standard uncertainty of each roll term that must vanish, or prove itself, and whether it enters."""
+    forbidden = symmetry in ("fourfold", "mirror")
+    power = solved.system.power[:, 3].sum()
+    out: dict[str, dict[str, Any]] = {}
+    for name in solved.choice.gated:
+        i = solved.system.names.index(name)
+        value, std = float(solved.fit.unknowns[i, 0]), float(np.sqrt(max(solved.covariance[i, i], 0.0)))
+        effect = float(((solved.system.matrix[:, i] * value) ** 2).sum())
+        significant = abs(value) > SIGNIFICANT * std and effect > 1e-12 * power
+        why = "" if significant else f"within {SIGNIFICANT:g} standard deviations of zero"
+        if forbidden:
+            why = f"{symmetry} symmetry makes it zero" + (", yet the runs show it" if significant else "")
+        out[name] = {"value": value, "std": std, "in_model": significant and not forbidden, "why": why}
+    return out

@@ -1,0 +1,72 @@
+"""Weights of the regression: how far each load of each run is trusted, and how steady and oscillatory tests share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from towtank.derive.system import System
+from towtank.errors import DeriveError
+from towtank.frames import Array
+from towtank.symbols import LOADS
+from towtank.tank.run import Run
+
+FLOOR = 0.01
+"""Smallest residual that is believed, as a share of the load's root mean square in the run (or kind, when steady)."""
+
+WEIGHT_STEADY = 0.7
+"""Default lambda: the value for slender craft, L/D > 8. A Run does not know its diameter; give 0.5 for fuller ones."""
+
+PAIRS = (("drift", "sway", "YKN"), ("incidence", "heave", "ZM"))
+"""Steady kind, oscillatory kind, and the loads on which lambda shares the weight between the two."""
+
+_END = 1e-6  # at lambda 0 or 1 the outvoted side keeps this share, so that Yvdot and the like stay determined
+
+
+def load_scale(system: System) -> Array:
+    """Root mean square (6,) of each load over all runs, each run counting once; never zero."""
+    scale = np.sqrt((system.power / system.count[:, None]).mean(axis=0))
+    return np.asarray(np.where(scale > 0.0, scale, np.where(scale.max() > 0.0, scale.max(), 1.0)))
+
+
+def spread(system: System, runs: Sequence[Run], unknowns: Array) -> Array:
+    """Standard deviation (R, 6) of each load of each run about the fit ``unknowns`` (n,).
+
+    An oscillation is judged by its own residual. A steady run is a single number, so the steady runs of one kind share
+    theirs. Never below FLOOR of the load, nor 1e-3 of the load's size over all runs.
+    """
+    mean_square = system.squares(unknowns) / system.count[:, None]
+    power = system.power / system.count[:, None]
+    for kind in {run.kind for run in runs if run.steady}:
+        at = [i for i, run in enumerate(runs) if run.steady and run.kind == kind]
+        mean_square[at], power[at] = mean_square[at].mean(axis=0), power[at].mean(axis=0)
+    smallest = np.maximum(FLOOR**2 * power, (1e-3 * load_scale(system)) ** 2)
+    return np.asarray(np.sqrt(np.maximum(mean_square, smallest)))
+
+
+def family(system: System, runs: Sequence[Run], weight_steady: float) -> Array:
+    """Weight (R, 6) of a sample of each load of each run before its spread is considered.
+
+    A run counts once, however finely it was sampled. Where steady and oscillatory tests of the same motion are both
+    there, J = (1 - lambda) J_vpmm / n_vpmm + lambda J_steady / n_steady shares their joint weight.
+
+    Source     perron, section 2.3, which refers to Miller et al. for the weighting of steady drift.
+    Departure  The formula of Miller et al. is not public; the form of J is this project's.
+    Valid      0 <= lambda <= 1.
+    """
+    if not 0.0 <= weight_steady <= 1.0:
+        raise DeriveError(
+            f"derive: weight_steady is {weight_steady:g}. It is the share of steady drift against sway, "
+            "so it lies between 0 (sway only) and 1 (steady drift only)."
+        )
+    share = np.repeat(1.0 / system.count[:, None], 6, axis=1)
+    lam = min(max(weight_steady, _END), 1.0 - _END)
+    for steady, oscillatory, loads in PAIRS:
+        a = [i for i, run in enumerate(runs) if run.kind == steady]
+        b = [i for i, run in enumerate(runs) if run.kind == oscillatory]
+        if a and b:
+            for load in (LOADS.index(name) for name in loads):
+                share[a, load] = lam * (len(a) + len(b)) / system.count[a].sum()
+                share[b, load] = (1.0 - lam) * (len(a) + len(b)) / system.count[b].sum()
+    return share
