@@ -89,7 +89,7 @@ def _myring(hull: Myring, faults: list[str]) -> Myring | None:
             )
             return None
     steepest = 3.0 * hull.diameter / (2.0 * hull.tail)
-    if np.tan(hull.tail_angle) > 2.0 * steepest:
+    if np.tan(hull.tail_angle) > steepest:
         faults.append(
             f"hull.tail_angle: {np.degrees(hull.tail_angle):.3g} deg makes the tail bulge beyond the diameter: with a "
             f"tail of {hull.tail:g} m it must stay below {np.degrees(np.arctan(steepest)):.3g} deg."
