@@ -67,8 +67,13 @@ NUMPY: Ops = cast(Ops, np)
 """Functions of arrays."""
 
 
+_PLAIN = {float, int}
+
+
 def ops_for(*scalars: Scalar) -> Ops:
     """``NUMPY`` when any of ``scalars`` is an array with at least one axis, else ``MATH``."""
+    if {*map(type, scalars)} <= _PLAIN:
+        return MATH
     return NUMPY if any(isinstance(x, np.ndarray) and x.ndim for x in scalars) else MATH
 
 
@@ -91,13 +96,6 @@ def product(matrix: Matrix, vector: Vector) -> list[Scalar]:
 def product_transposed(matrix: Matrix, vector: Vector) -> list[Scalar]:
     """Transposed matrix times vector."""
     return product([*zip(*matrix, strict=True)], vector)
-
-
-def cross(a: Vector, b: Vector) -> list[Scalar]:
-    """Vector product of two vectors (3,)."""
-    a1, a2, a3 = a
-    b1, b2, b3 = b
-    return [a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1]
 
 
 def interpolate(x: Scalar, knots: Sequence[float], values: Sequence[float], ops: Ops) -> Scalar:

@@ -21,7 +21,7 @@ from towtank.craft.craft import Craft
 from towtank.derive.table import Derivatives
 from towtank.errors import InputError
 from towtank.model.added_mass import added_mass_matrix, coriolis_full, coriolis_reduced
-from towtank.model.algebra import MATH, Matrix, Ops, Scalar, Vector, cross, frozen, ops_for, product, product_transposed
+from towtank.model.algebra import MATH, Matrix, Ops, Scalar, Vector, frozen, ops_for, product, product_transposed
 from towtank.model.damping import damping_matrix
 from towtank.model.fins import (
     FinSet,
@@ -114,20 +114,26 @@ def right_hand_side(
 ) -> list[Scalar]:
     """Time derivatives of ``state``: 12 as in ``STATE``, then the fins.
 
+    ``acceleration`` gives the rate of the velocity through the water; a steady current seen from the turning body
+    adds -omega x v_c.
+
     Source     perron, eq. 2.9 and 2.11; fossen2021, ch. 10, for the current.
     """
-    nu, delta = state[6:12], state[12:]
+    delta = state[12:]
+    u, v, w, p, q, r = state[6:12]
     trig = trig_of(state[3:6], ops)
     J1 = rotation_matrix(trig)
-    drift = product_transposed(J1, current)
-    water = [a - b for a, b in zip(nu, drift, strict=False)] + list(nu[3:])
-    nudot = acceleration(k, water, trig, delta, thrust, ops)
-    turning = cross(nu[3:], drift)
+    u_c, v_c, w_c = product_transposed(J1, current)
+    udot, vdot, wdot, pdot, qdot, rdot = acceleration(k, [u - u_c, v - v_c, w - w_c, p, q, r], trig, delta, thrust, ops)
     return [
-        *product(J1, nu[:3]),
-        *product(euler_matrix(trig), nu[3:]),
-        *[a - b for a, b in zip(nudot, turning, strict=False)],
-        *nudot[3:],
+        *product(J1, [u, v, w]),
+        *product(euler_matrix(trig), [p, q, r]),
+        udot + (r * v_c - q * w_c),
+        vdot + (p * w_c - r * u_c),
+        wdot + (q * u_c - p * v_c),
+        pdot,
+        qdot,
+        rdot,
         *actuator_rates(k.fins, delta, command, ops),
     ]
 
