@@ -18,7 +18,6 @@ _PUBLIC = {
     "FastTank": "towtank.tank.fast.tank",
     "LpmTank": "towtank.tank.lpm",
     "Run": "towtank.tank.run",
-    "derive": "towtank.derive.derive",
     "Derivatives": "towtank.derive.table",
     "Model": "towtank.model.equations",
     "straight_run": "towtank.trials.straight",
@@ -30,13 +29,17 @@ _PUBLIC = {
     "depth_step": "towtank.trials.steps",
     "lawnmower": "towtank.trials.mission",
     "assess": "towtank.verdict.assess",
-    "report": "towtank.report.build",
 }
 
-__all__ = ["__version__", *sorted(_PUBLIC)]
+_STAGES = {"derive", "report"}
+"""Packages that are called themselves."""
+
+__all__ = ["__version__", *sorted(_STAGES | set(_PUBLIC))]
 
 
 def __getattr__(name: str) -> Any:
+    if name in _STAGES:
+        return importlib.import_module(f"towtank.{name}")
     if name not in _PUBLIC:
         raise AttributeError(f"module 'towtank' has no attribute {name!r}")
     return getattr(importlib.import_module(_PUBLIC[name]), name)

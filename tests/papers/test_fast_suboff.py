@@ -6,48 +6,18 @@ the constants and what each was set on.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import yaml
 
+from suboff import DATA, U, control, drift_point, primes, slopes
 from towtank import read_craft
 from towtank.craft.craft import Craft
 from towtank.plan.kinds import CaptiveTest
-from towtank.plan.motion import Drift, Turn
+from towtank.plan.motion import Drift
 from towtank.progress import Silent
 from towtank.tank.fast.tank import FastTank
 
-DATA = yaml.safe_load((Path(__file__).parents[1] / "data" / "suboff_roddy.yaml").read_text())
-U, L = 3.344, 4.261
 BARE, PLUS, X = (read_craft(name) for name in ("suboff-bare", "suboff-fins", "suboff-x"))
-
-
-def primes(craft: Craft, test: CaptiveTest, tank: FastTank) -> np.ndarray:
-    """X' Y' Z' K' M' N' of the nominal and the members, (members + 1, 6)."""
-    run = tank.run(craft, test, Silent())
-    loads = run.loads[None, 0] if run.ensemble is None else np.concatenate([run.loads[None, 0], run.ensemble[:, 0]])
-    return loads / (0.5 * craft.water.density * U**2 * L**2) / np.array([1, 1, 1, L, L, L])
-
-
-def slopes(craft: Craft, members: int = 0) -> dict[str, np.ndarray]:
-    """Slopes at the origin, each (members + 1,), by central differences of small steady tests."""
-    tank, h = FastTank(members=members), 1e-3
-    drift = [primes(craft, CaptiveTest("drift", U, Drift(U, s * h)), tank) for s in (1, -1)]
-    turn = [primes(craft, CaptiveTest("turn", U, Turn(U, s * h * U / L)), tank) for s in (1, -1)]
-    v, r = (drift[1] - drift[0]) / (2 * h), (turn[0] - turn[1]) / (2 * h)
-    return {"Yv": v[:, 1], "Nv": v[:, 5], "Yr": r[:, 1], "Nr": r[:, 5]}
-
-
-def control(craft: Craft, members: int = 0) -> dict[str, np.ndarray]:
-    tank, h = FastTank(members=members), np.radians(5.0)
-    both = [
-        primes(craft, CaptiveTest("rudder", U, Drift(U, 0.0), fins=tuple(craft.mixing @ [s * h, 0, 0])), tank)
-        for s in (1, -1)
-    ]
-    slope = (both[0] - both[1]) / (2 * h)
-    return {"Ydr": slope[:, 1], "Ndr": slope[:, 5]}
 
 
 # Bands: what docs/fast-tank.md publishes as measured, with one per cent for rounding of the mesh.
@@ -65,19 +35,10 @@ def test_derivatives_agree_with_roddy(craft: Craft, case: str, limits: dict[str,
         assert found[name][0] == pytest.approx(DATA["derivatives"][case][name], rel=limit), name
 
 
-def antisymmetric(angle: float) -> tuple[float, float, float, float]:
-    """beta [rad], X', Y', N' from the rows at +beta and -beta; the offset of the model's zero drops out."""
-    rows = np.array(DATA["drift_bare"], dtype=float)
-    plus = rows[np.argmin(np.abs(rows[:, 0] - angle))]
-    minus = rows[np.argmin(np.abs(rows[:, 0] + angle))]
-    beta = np.radians(0.5 * (plus[0] - minus[0]))
-    return beta, 0.5 * (plus[1] + minus[1]), 0.5 * (plus[2] - minus[2]), 0.5 * (plus[3] - minus[3])
-
-
 @pytest.mark.parametrize("angle", [4, 8, 12, 16, 18])
 def test_bare_hull_drift_table_is_met_within_eight_per_cent(angle: int) -> None:
     """Fitted: the cross-flow law was set on this table."""
-    beta, x, y, n = antisymmetric(angle)
+    beta, x, y, n = drift_point(angle)
     found = primes(BARE, CaptiveTest("drift", U, Drift(U, beta)), FastTank(members=0))[0]
     assert found[0] == pytest.approx(x, rel=0.08)
     assert found[1] == pytest.approx(y, rel=0.08)
