@@ -172,7 +172,8 @@ def _deflections(craft: Craft, U: float) -> Iterator[CaptiveTest]:
     """
 
     def test(name: str, degrees: int, column: Array) -> CaptiveTest:
-        fins = tuple(float(angle) for angle in column * math.radians(degrees))
+        # Rounded: a mixing matrix is exact to its last bits only, and nobody orders 10.000000000000002 deg.
+        fins = tuple(math.radians(round(float(share) * degrees, 9)) for share in column)
         peak = max(abs(angle) for angle in fins)
         return CaptiveTest(
             f"{name}-{signed(degrees, '02d')}", U, Drift(U, 0.0), fins, exploratory=peak > FIN_WARNING * (1.0 + 1e-9)
