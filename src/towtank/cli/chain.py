@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from towtank.cli.reply import Reply
 from towtank.cli.study import Study, file_hash, program_hash
-from towtank.errors import ArtefactError, InputError
+from towtank.errors import ArtefactError, CraftError, InputError
 from towtank.provenance import digest
 
 if TYPE_CHECKING:
@@ -124,6 +124,7 @@ class Chain:
         from towtank.craft.library import craft_text, write_craft_copy
         from towtank.craft.solid import write_glb, write_stl
 
+        self._check()
         own = self.study.craft
         if Path(self.source) != own:
             if self.study.edited(own) and own.read_text(encoding="utf-8") != craft_text(self.source):
@@ -136,6 +137,16 @@ class Chain:
         write_stl(self.craft, stl)
         write_glb(self.craft, glb)
         return own, stl, glb
+
+    def _check(self) -> None:
+        from towtank.craft.hydrostatics import check
+
+        findings = check(self.craft).findings
+        for finding in findings:
+            if finding.severity == "warning":
+                self.reply.log(f"  warning: {finding.where}: {finding.message}")
+        if errors := [f"{item.where}: {item.message}" for item in findings if item.severity == "error"]:
+            raise CraftError(f"{self.source}: " + "\n".join(errors))
 
     def make_plan(self) -> None:
         """Lay out the captive tests, unless the user edited the plan of the study: then that one holds."""

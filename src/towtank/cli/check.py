@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from towtank.cli.options import CraftArgument, Debug, Json, Out
@@ -50,12 +51,17 @@ def _text(craft: Craft, h: Hydrostatics) -> str:
     rows = [
         ("length, diameter", f"{h.length:.4g} m, {h.diameter:.4g} m (ratio {h.slenderness:.3g})"),
         ("volume", f"{h.volume:.5g} m3 (hull {h.hull_volume:.5g}, fins {h.fin_volume:.3g})"),
-        ("wetted area", f"{h.wetted_area:.5g} m2"),
+        ("wetted area", f"{h.wetted_area:.5g} m2 (hull {h.hull_wetted_area:.5g})"),
         ("prismatic coefficient", f"{h.prismatic:.4f}"),
-        ("mass, displaced mass", f"{craft.mass.mass:.6g} kg, {h.displaced_mass:.6g} kg"),
+        ("mass", f"{h.mass:.6g} kg"),
+        ("displaced mass", f"{h.displaced_mass:.6g} kg of the shape, {h.stated_displaced_mass:.6g} kg in the file"),
         ("net buoyancy", f"{h.net_buoyancy_percent:+.3g} % of the weight"),
+        ("centre of buoyancy", f"{h.cb_from_nose:.5g} m aft of the nose"),
         ("CB from origin", "{:.4g}, {:.4g}, {:.4g} m".format(*h.cb)),
         ("CG from origin", "{:.4g}, {:.4g}, {:.4g} m".format(*craft.mass.cg)),
+        ("pitch at rest", f"{degrees(h.trim):.3g} deg, bow up positive"),
+        ("roll stiffness", f"{h.restoring:.4g} N m/rad"),
+        ("Reynolds number", f"{h.reynolds:.3g} at {craft.speed:.4g} m/s"),
         ("fins, symmetry", f"{len(craft.fins)}, {craft.symmetry}"),
     ]
     return "\n".join([craft.title or craft.name, *(f"  {name:<22} {value}" for name, value in rows)])
