@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from towtank.craft.craft import Craft
+from towtank.craft.hydrostatics import hydrostatics
 from towtank.derive.table import Derivatives
 from towtank.errors import InputError
 from towtank.model.added_mass import added_mass_matrix, coriolis_full, coriolis_reduced
@@ -51,13 +52,13 @@ class ModelOptions:
 
     kappa_v, kappa_r : straightening factors for drift and for turning (see ``fins.effective_angles``).
     axisymmetric_crossflow : cross-flow terms grow with the total cross-flow (see ``damping.damping_matrix``).
-    centre_of_buoyancy : (3,) [m] from the body origin.
+    centre_of_buoyancy : (3,) [m] from the body origin; None takes it from hull and fins.
     """
 
     kappa_v: float = 0.0
     kappa_r: float = 0.0
     axisymmetric_crossflow: bool = False
-    centre_of_buoyancy: tuple[float, float, float] = STILL
+    centre_of_buoyancy: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -174,13 +175,11 @@ class Model:
     def constants(self) -> Constants:
         """What the right-hand side needs, computed once."""
         values = values_of(self.derivatives)
-        body = body_of(self.craft, self.options.centre_of_buoyancy)
-        added = added_mass_matrix(values)
         c = SimpleNamespace(**{name: values.get(name, 0.0) for name in TERMS})
         return Constants(
-            body=body,
+            body=self.body,
             c=c,
-            added=added,
+            added=added_mass_matrix(values),
             mass_inverse=frozen(_inverse(self.mass_matrix, self.derivatives.craft)),
             fins=fin_set(self.craft),
             screw=screw_of(self.craft, -c.Xuu),
@@ -189,11 +188,16 @@ class Model:
         )
 
     @cached_property
+    def body(self) -> Body:
+        """Mass, inertia, CG and centre of buoyancy."""
+        cb = self.options.centre_of_buoyancy
+        return body_of(self.craft, hydrostatics(self.craft).cb if cb is None else cb)
+
+    @cached_property
     def mass_matrix(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """M_RB - M_A (6, 6) [kg, kg m, kg m2]."""
-        body = body_of(self.craft, self.options.centre_of_buoyancy)
         added = added_mass_matrix(values_of(self.derivatives))
-        return np.asarray(np.array(mass_matrix(body), dtype=float) - np.array(added, dtype=float))
+        return np.asarray(np.array(mass_matrix(self.body), dtype=float) - np.array(added, dtype=float))
 
     @property
     def states(self) -> tuple[str, ...]:
