@@ -67,6 +67,11 @@ class Fin:
         """Thickness-to-chord ratio of the section."""
         return int(self.section[-2:]) / 100.0
 
+    @property
+    def half_radius(self) -> float:
+        """Half the tip radius [m]: the one section that stands for the fin, however its trapezoid is given."""
+        return 0.5 * self.tip_radius
+
     def chord(self, y: Array | float) -> Array:
         """Chord [m] at the radius ``y`` [m] from the hull axis."""
         slope = (self.tip_chord - self.root_chord) / (self.tip_radius - self.root_radius)

@@ -124,8 +124,7 @@ def velocity_profile(layer: BoundaryLayer, station: float, case: int) -> tuple[f
 
 def wake_factor(layer: BoundaryLayer, fin: Fin, case: int) -> float:
     """Mean of (u/U)^2 over the span of a fin, weighted with chord and an elliptic loading."""
-    middle = 0.5 * (fin.root_radius + fin.tip_radius)
-    station = float(fin.trailing_edge_at(middle) - 0.5 * fin.chord(middle))
+    station = float(fin.trailing_edge_at(fin.half_radius) - 0.5 * fin.chord(fin.half_radius))
     delta, n, r, edge = velocity_profile(layer, min(station, float(layer.x[-1])), case)
     share = np.linspace(0.0, 1.0, 200)
     y = r + (fin.tip_radius - r) * share

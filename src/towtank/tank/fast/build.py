@@ -62,7 +62,7 @@ def _march_astern(craft: Craft, flow: HullFlow, design: float) -> BoundaryLayer:
 
 def _fin(craft: Craft, layer: BoundaryLayer, index: int, speed: float) -> FinData:
     fin = craft.fins[index]
-    chord = float(fin.chord(0.5 * (fin.root_radius + fin.tip_radius)))
+    chord = float(fin.chord(fin.half_radius))
     reynolds = max(craft.water.reynolds(speed, chord), 1e3)
     friction = 0.075 / (np.log10(reynolds) - 2.0) ** 2
     return fin_data(craft, fin, wake_factor(layer, fin, -1), friction)

@@ -43,8 +43,8 @@ def panel_stations(craft: Craft, rings: int) -> Array:
     x = 0.5 * (edges[1:] + edges[:-1])
     density = 1.0 / np.sqrt(np.clip((x / length) * (1.0 - x / length), 1e-4, None))
     for fin in craft.fins[:1]:
-        chord = float(fin.chord(0.5 * (fin.root_radius + fin.tip_radius)))
-        middle = fin.trailing_edge - 0.5 * chord
+        chord = float(fin.chord(fin.half_radius))
+        middle = float(fin.trailing_edge_at(fin.half_radius)) - 0.5 * chord
         density = density + 0.75 * (length / chord) * np.exp(-(((x - middle) / (0.9 * chord)) ** 2))
     share = np.concatenate([[0.0], np.cumsum(density)])
     return np.interp(np.linspace(0.0, 1.0, rings + 1), share / share[-1], edges)
@@ -173,7 +173,7 @@ def fin_lattice(craft: Craft, fin: Fin, chordwise: int = CHORDWISE, spanwise: in
     Source     katzplotkin2001, chapter 12.
     """
     along = fin.span_direction
-    root_x = fin.trailing_edge - 0.5 * fin.root_chord
+    root_x = float(fin.trailing_edge_at(fin.half_radius) - 0.5 * fin.chord(fin.half_radius))
     root = float(max(craft.profile.radius(np.array([root_x]))[0], 1e-6))
     radii = np.linspace(root, fin.tip_radius, spanwise + 1)
 
