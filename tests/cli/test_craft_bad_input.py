@@ -71,6 +71,7 @@ def test_fin_behind_the_tail(tmp_path):
     message = fault(tmp_path, ('"1.88 m"', '"2.1 m"'))
     assert "fins.trailing_edge: the root trailing edge lies 2.1 m aft of the nose, behind the tail at 2 m" in message
     assert "Move the fin forward by 0.1 m" in message
+    assert "one fault" in message  # told once for the four fins of the shape
 
 
 def test_fin_ahead_of_the_nose(tmp_path):
@@ -192,16 +193,18 @@ def test_offsets_in_a_unit_that_is_no_length(tmp_path):
 
 def test_two_ways_to_state_buoyancy(tmp_path):
     message = fault(tmp_path, ("net_buoyancy_percent = 0.5", 'net_buoyancy_percent = 0.5\nbuoyancy = "neutral"'))
-    assert "mass: net_buoyancy_percent and buoyancy says what the craft displaces. Give exactly one" in message
+    assert "mass: net_buoyancy_percent and buoyancy are given together. Give exactly one" in message
 
 
 def test_no_way_to_state_buoyancy(tmp_path):
-    assert "mass: nothing says what the craft displaces" in fault(tmp_path, ("^net_buoyancy_percent = 0.5", ""))
+    assert "mass: none of net_buoyancy_percent, buoyancy, volume is given" in fault(
+        tmp_path, ("^net_buoyancy_percent = 0.5", "")
+    )
 
 
 def test_two_ways_to_place_fins(tmp_path):
     message = fault(tmp_path, ('layout        = "x"', 'layout = "x"\ncount = 3'))
-    assert "fins: layout and count says where the fins are. Give exactly one" in message
+    assert "fins: layout and count are given together. Give exactly one of layout, azimuths, count" in message
 
 
 def test_signs_of_another_number_of_fins(tmp_path):
@@ -276,6 +279,13 @@ def test_all_faults_are_told_at_once(tmp_path):
 def test_faults_of_fins_are_told_beside_those_of_other_sections(tmp_path):
     message = fault(tmp_path, ('"53.84 kg"', '"-53.84 kg"'), ('"1.88 m"', '"2.1 m"'))
     assert "mass.mass:" in message
+    assert "fins.trailing_edge:" in message
+
+
+def test_fault_of_the_centre_of_gravity_is_told_beside_that_of_the_fins(tmp_path):
+    message = fault(tmp_path, ('z = "0.01 m"', 'z = "0.3 m"'), ('"1.88 m"', '"2.1 m"'))
+    assert "2 faults" in message
+    assert "mass.cg:" in message
     assert "fins.trailing_edge:" in message
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from towtank.craft.origins import Origins, assumed_keys
 from towtank.craft.schema import HULLS, REQUIRED, SECTIONS, Given, Section
 from towtank.errors import CraftError
 
@@ -19,6 +20,7 @@ class Sections:
     tables: dict[str, Section] = field(default_factory=dict)
     fins: list[tuple[str, Section]] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
+    origins: Origins = field(default_factory=Origins)
 
 
 def read_toml(text: str, where: str) -> dict[str, Any]:
@@ -59,6 +61,8 @@ def read_sections(raw: Mapping[str, Any]) -> Sections:
             section = _one(name, content, found.faults)
             if section:
                 found.tables[name] = section
+    for path, section in [*found.tables.items(), *found.fins]:
+        found.origins.add(path, section)
     return found
 
 
@@ -83,7 +87,7 @@ def _section(path: str, model: type[Section], content: Any, faults: list[str]) -
     except ValidationError as error:
         faults.extend(_fault(path, model, item) for item in error.errors())
         return None
-    wrong = [key for key in _assumed_keys(section) if key not in model.model_fields]
+    wrong = [key for key in assumed_keys(section) if key not in model.model_fields]
     faults.extend(f"{path}.assumed: {key!r} is no key of it. {_closest(key, _keys(model))}" for key in wrong)
     return None if wrong else section
 
@@ -130,64 +134,21 @@ def _closest(name: str, keys: Iterable[str]) -> str:
     return f"Did you mean {near[0]}?" if near else f"Known here: {', '.join(keys)}."
 
 
-def _assumed_keys(section: Section) -> tuple[str, ...]:
-    return section.assumed if isinstance(section.assumed, tuple) else ()
+def value(section: Any, key: str, default: float = 0.0) -> float:
+    """SI value of a number of ``section``, or ``default`` where the file leaves it out."""
+    given = getattr(section, key)
+    return given.value if isinstance(given, Given) else default
 
 
-def _numbers(section: Section) -> Iterator[tuple[str, str, Given]]:
-    """(key, dotted name inside the section, number) of every number of ``section`` itself."""
-    for key in type(section).model_fields:
-        value = getattr(section, key)
-        items = value if isinstance(value, list) else [value]
-        for number, item in enumerate(items, start=1):
-            if isinstance(item, Given):
-                yield key, f"{key}[{number}]" if isinstance(value, list) else key, item
+def given_values(section: Section, keys: tuple[str, ...]) -> dict[str, float]:
+    """SI values of those of ``keys`` that the file gives."""
+    return {key: getattr(section, key).value for key in keys if isinstance(getattr(section, key), Given)}
 
 
-@dataclass
-class Origins:
-    """Where the numbers come from: dotted names, in the order of the file."""
-
-    assumed: list[str] = field(default_factory=list)
-    unsourced: list[str] = field(default_factory=list)
-    sources: dict[str, str] = field(default_factory=dict)
-
-    def add(self, path: str, section: Section) -> None:
-        """Sort the numbers of ``section`` into assumed, unsourced and sourced."""
-        if section.source:
-            self.sources[path] = section.source
-        marked = _assumed_keys(section)
-        for key, name, number in _numbers(section):
-            if number.source:
-                self.sources[f"{path}.{name}"] = number.source
-            by_section = key in marked or (section.assumed is True and not number.source)
-            if by_section if number.assumed is None else number.assumed:
-                self.assumed.append(f"{path}.{name}")
-            elif not number.source and not section.source:
-                self.unsourced.append(f"{path}.{name}")
-        for key in type(section).model_fields:
-            value = getattr(section, key)
-            if isinstance(value, Section):
-                self.add(f"{path}.{key}", _inherit(section, key, value))
-            elif key not in ("source", "assumed") and not isinstance(value, Given) and value is not None:
-                self._add_other(path, section, key, value)
-
-    def _add_other(self, path: str, section: Section, key: str, value: Any) -> None:
-        """A key that is no quantity, such as a section name or a table of offsets."""
-        named = key in _assumed_keys(section)
-        table = isinstance(value, list) and value and isinstance(value[0], tuple)
-        if named or (section.assumed is True and (table or key in ("section", "layout", "kind"))):
-            self.assumed.append(f"{path}.{key}")
-        elif table and not section.source:
-            self.unsourced.append(f"{path}.{key}")
-
-    def default(self, name: str, reason: str) -> None:
-        """Record a number that the file leaves out and the program supplies."""
-        self.assumed.append(name)
-        self.sources[name] = reason
-
-
-def _inherit(outer: Section, key: str, inner: Section) -> Section:
-    """``inner`` with the source and mark of the section it lies in, where it has none of its own."""
-    assumed = inner.assumed or outer.assumed is True or key in _assumed_keys(outer)
-    return inner.model_copy(update={"source": inner.source or outer.source, "assumed": assumed})
+def one_of(path: str, section: Section, keys: tuple[str, ...], faults: list[str]) -> list[str]:
+    """Those of ``keys`` that the file gives; any number but one of them is a fault."""
+    ways = [key for key in keys if getattr(section, key) is not None]
+    if len(ways) != 1:
+        some = f"{' and '.join(ways)} are given together" if ways else f"none of {', '.join(keys)} is given"
+        faults.append(f"{path}: {some}. Give exactly one of {', '.join(keys)}.")
+    return ways
