@@ -67,9 +67,7 @@ def derive(
         craft=kept[0].craft,
         level=" + ".join(sorted({run.level for run in kept})),
         variant="lumped",
-        reference=Reference(
-            kept[0].length, mode(run.speed for run in kept), kept[0].density, kept[0].origin_from_nose
-        ),
+        reference=Reference(kept[0].length, mode(run.speed for run in kept), kept[0].density, kept[0].origin_from_nose),
         names=expansion.names,
         values=members[:, 0],
         covariance_fit=expansion.matrix @ solved.covariance @ expansion.matrix.T,

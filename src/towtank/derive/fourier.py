@@ -44,7 +44,9 @@ def fourier(runs: Sequence[Run], samples: Samples) -> dict[str, dict[str, float]
     Valid      Small angles, one frequency. Splitting linear from quadratic by the third harmonic magnifies noise in
                the quadratic term 5.9 times; the regression uses several amplitudes instead.
     """
-    return {name_of(run, runs): _one(run, samples, i) for i, run in enumerate(runs) if run.kind in DRIVEN and not run.steady}
+    return {
+        name_of(run, runs): _one(run, samples, i) for i, run in enumerate(runs) if run.kind in DRIVEN and not run.steady
+    }
 
 
 def _one(run: Run, samples: Samples, number: int) -> dict[str, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from towtank.derive import weights
 from towtank.derive.cycles import Samples, scatter
-from towtank.derive.regress import Fit, block_covariance, solve
+from towtank.derive.regress import Fit, Units, block_covariance, solve
 from towtank.derive.select import Choice, choose, independent
 from towtank.derive.system import System, build
 from towtank.errors import DeriveError
@@ -64,16 +64,19 @@ def identify(runs: Sequence[Run], samples: Samples, weight_steady: float) -> Sol
     first = solve(system, 1.0 / (system.count[:, None] * scale**2))
     spread = weights.spread(system, runs, first.unknowns[:, 0])
     share = weights.family(system, runs, weight_steady)
-    solved = weighted(samples, choice, system, spread, share)
+    solved = weighted(runs, samples, choice, system, spread, share)
     gated = _gate(solved, runs[0].symmetry)
     out = {name: str(entry["why"]) for name, entry in gated.items() if not entry["in_model"]}
     if out:
         left = [i for i, name in enumerate(system.names) if name not in out]
-        solved = weighted(samples, choice.keep([system.names[i] for i in left], out), system.keep(left), spread, share)
+        choice, system = choice.keep([system.names[i] for i in left], out), system.keep(left)
+        solved = weighted(runs, samples, choice, system, spread, share)
     return Solved(**{**vars(solved), "gated": gated})
 
 
-def weighted(samples: Samples, choice: Choice, system: System, spread: Array, share: Array) -> Solved:
+def weighted(
+    runs: Sequence[Run], samples: Samples, choice: Choice, system: System, spread: Array, share: Array
+) -> Solved:
     """Solve with given spread and family weight (R, 6), with the covariance of independent blocks."""
     weight = share / spread**2
     fit = solve(system, weight)
@@ -81,7 +84,9 @@ def weighted(samples: Samples, choice: Choice, system: System, spread: Array, sh
     misfit = float(squares.sum() / (share * system.count[:, None]).sum())
     whole = _repeats(samples, system, weight, squares)
     block = system.run if whole else system.run * (int(system.period.max()) + 1) + system.period
-    covariance, blocks = block_covariance(fit, block, misfit)
+    kinds = sorted({run.kind for run in runs if run.steady})
+    pool = np.array([kinds.index(run.kind) if run.steady else -1 for run in runs], dtype=np.intp)
+    covariance, blocks = block_covariance(fit, Units(block, system.load, pool[system.run]), misfit)
     unit = "run" if whole else "run and period"
     return Solved(choice, system, share, spread, weight, fit, covariance, blocks, unit)
 
@@ -104,7 +109,7 @@ def _gate(solved: Solved, symmetry: str) -> dict[str, dict[str, Any]]:
         i = solved.system.names.index(name)
         value, std = float(solved.fit.unknowns[i, 0]), float(np.sqrt(max(solved.covariance[i, i], 0.0)))
         effect = float(((solved.system.matrix[:, i] * value) ** 2).sum())
-        significant = abs(value) > SIGNIFICANT * std and effect > 1e-12 * power
+        significant = bool(abs(value) > SIGNIFICANT * std and effect > 1e-12 * power)
         why = "" if significant else f"within {SIGNIFICANT:g} standard deviations of zero"
         if forbidden:
             why = f"{symmetry} symmetry makes it zero" + (", yet the runs show it" if significant else "")

@@ -84,7 +84,7 @@ def tie_gaps(runs: Sequence[Run], samples: Samples, solved: Solved) -> dict[str,
     scale = weights.load_scale(system)
     kept, reasons = independent(system.matrix / scale[system.load][:, None], names)
     free, system = free.keep([names[i] for i in kept], reasons), system.keep(kept)
-    own = weighted(nominal, free, system, solved.spread, solved.share)
+    own = weighted(runs, nominal, free, system, solved.spread, solved.share)
     out = {}
     for term, (base, sign) in FOURFOLD_TIES.items():
         if term in system.names and base in solved.system.names:

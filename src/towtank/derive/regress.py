@@ -14,6 +14,9 @@ from towtank.frames import Array
 LEVERAGE = 0.99
 """A direction that owes more than this share of its information to one block has no residual to judge it by."""
 
+POOLED = 0.5
+"""Weight of the variance pooled over the steady runs of one kind, against that of the runs one by one."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -50,36 +53,72 @@ def solve(system: System, weight: Array) -> Fit:
     return Fit(solution / scale[:, None], condition, r, scale, scaled, error)
 
 
-def block_covariance(fit: Fit, block: NDArray[np.intp], misfit: float) -> tuple[Array, int]:
-    """Covariance (n, n) of the nominal unknowns and the number of blocks.
+@dataclass(frozen=True)
+class Units:
+    """The independent units of the data, row by row. block (rows,) : the unit; load (rows,) : which of the six loads.
 
-    Parameters
-    ----------
-    block : (rows,) number of the independent unit (run, or run and period) of each row.
-    misfit : weighted mean square residual of the whole fit, used where a single block decides a direction.
+    pool (rows,) : number of the kind of a steady run, -1 for an oscillation. A steady run is a single condition, so
+    the runs of one kind share half of an error covariance between their loads; an oscillation is judged by its own cycles.
+    """
 
-    The block jackknife: the sum over blocks of the squared change of the result when that block is left out, times
-    (G - 1) / G. Samples within a block may be correlated in any way. A direction that rests on one block alone has no
-    such change; it gets the mean square residual of the whole fit, with the block counted as one observation.
+    block: NDArray[np.intp]
+    load: NDArray[np.intp]
+    pool: NDArray[np.intp]
 
-    Source     bellmccaffrey2002 (their CR3 form); cameronmiller2015, section VI.
+
+def block_covariance(fit: Fit, units: Units, misfit: float) -> tuple[Array, int]:
+    """Covariance (n, n) of the nominal unknowns and the number of independent blocks.
+
+    misfit : weighted mean square residual of the whole fit, used where no residual is left to judge by.
+
+    Oscillations: the block jackknife, the sum over blocks of the squared change of the result when that block is left
+    out, times (G - 1) / G. Samples within a block may be correlated in any way. A direction that rests on one block
+    alone has no such change; it gets ``misfit``, with the block counted as one observation. Steady runs: the mean of the
+    jackknife over runs and of the residual covariance of their kind over its degrees of freedom.
+
+    Source     bellmccaffrey2002 (their jackknife form, CR3); cameronmiller2015, section VI.
+    Departure  Steady runs are half pooled by kind: the jackknife alone is erratic where a term rests on a few of them
+               (Xvr on four turns), the pool alone is wrong where their errors grow with the load (fins).
     Valid      Blocks independent of each other. Errs on the large side with few blocks.
     """
-    numbers, where = np.unique(block, return_inverse=True)
-    n, groups = len(fit.scale), len(numbers)
     white = solve_triangular(fit.root, fit.weighted.T, trans="T").T
-    score = np.zeros((groups, n))
-    np.add.at(score, where, white * fit.error[:, None])
-    order = np.argsort(where, kind="stable")
-    edges = np.searchsorted(where[order], np.arange(groups + 1))
+    total = _jackknife(white, fit.error, units.block, units.pool < 0, misfit)
+    total += (1.0 - POOLED) * _jackknife(white, fit.error, units.block, units.pool >= 0, misfit)
+    for pool in np.unique(units.pool[units.pool >= 0]):
+        at = units.pool == pool
+        total += POOLED * _pooled(white[at], fit.error[at], units.block[at], units.load[at], misfit)
+    back = solve_triangular(fit.root, np.eye(len(fit.scale))) / fit.scale[:, None]
+    return back @ total @ back.T, len(np.unique(units.block))
+
+
+def _jackknife(white: Array, error: Array, block: NDArray[np.intp], rows: NDArray[np.bool_], misfit: float) -> Array:
+    """Covariance (n, n) of the whitened unknowns from the blocks of the oscillations."""
+    n = white.shape[1]
     total = np.zeros((n, n))
-    factor = max(groups - 1, 1) / groups
-    for g in range(groups):
-        own = white[order[edges[g] : edges[g + 1]]]
+    numbers = np.unique(block[rows])
+    factor = max(len(numbers) - 1, 1) / max(len(numbers), 1)
+    order = np.flatnonzero(rows)[np.argsort(block[rows], kind="stable")]
+    edges = np.searchsorted(block[order], numbers)
+    for at in np.split(order, edges[1:]) if len(numbers) else []:
+        own = white[at]
         share, axes = np.linalg.eigh(own.T @ own)
         alone = share > LEVERAGE
-        change = axes @ (np.where(alone, 0.0, 1.0 / (1.0 - np.where(alone, 0.0, share))) * (axes.T @ score[g]))
+        inflate = np.where(alone, 0.0, 1.0 / (1.0 - np.where(alone, 0.0, share)))
+        change = axes @ (inflate * (axes.T @ (own.T @ error[at])))
         total += factor * np.outer(change, change)
         total += misfit * (axes[:, alone] * share[alone]) @ axes[:, alone].T
-    back = solve_triangular(fit.root, np.eye(n)) / fit.scale[:, None]
-    return back @ total @ back.T, groups
+    return total
+
+
+def _pooled(white: Array, error: Array, block: NDArray[np.intp], load: NDArray[np.intp], misfit: float) -> Array:
+    """Covariance (n, n) of the whitened unknowns from the steady runs of one kind, six loads each."""
+    numbers, run = np.unique(block, return_inverse=True)
+    rows = np.zeros((len(numbers), 6, white.shape[1]))
+    errors = np.zeros((len(numbers), 6))
+    rows[run, load], errors[run, load] = white, error
+    freedom = np.bincount(load, minlength=6) - np.bincount(load, weights=(white**2).sum(axis=1), minlength=6)
+    judged = freedom > 0.5
+    root = np.where(judged, 1.0 / np.sqrt(np.where(judged, freedom, 1.0)), 0.0)
+    common = (errors.T @ errors) * np.outer(root, root)
+    common[np.diag_indices(6)] += np.where(judged, 0.0, misfit)
+    return np.asarray(np.einsum("bkn,kl,blm->nm", rows, common, rows, optimize=True))

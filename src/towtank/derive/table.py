@@ -60,3 +60,11 @@ class Derivatives:
     def as_dict(self) -> dict[str, float]:
         """Term -> value."""
         return dict(zip(self.names, (float(v) for v in self.values), strict=True))
+
+    def __str__(self) -> str:
+        """The table of ``towtank.derive.show``."""
+        from towtank.derive.show import table
+
+        return table(self)
+
+    __repr__ = __str__
