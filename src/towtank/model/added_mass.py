@@ -22,7 +22,7 @@ def coriolis_full(added: Matrix, nu: Vector) -> Matrix:
     """C_A(nu) (6, 6) of M_A by Kirchhoff's equations; the load on the body is +C_A nu (variant "split").
 
     Source     fossen2021, ch. 6; lamb1932, ch. VI: with the impulse (a, b) = M_A nu the load is
-               (a x omega, a x v + b x omega).
+               (omega x a, v x a + omega x b).
     Departure  perron's eq. 2.15 leaves out the products u v, u w, u q, u r and v r, w q, r r, q q.
     """
     a1, a2, a3, b1, b2, b3 = product(added, nu)
