@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from towtank.cli.reply import Reply
+from towtank.cli.reply import Remarks, Reply
 from towtank.cli.study import Study, file_hash, program_hash
 from towtank.errors import ArtefactError, CraftError, InputError
 from towtank.provenance import digest
@@ -45,6 +46,8 @@ def open_chain(reply: Reply, craft: str | None, out: Path | None, speed: str | N
     if inside:
         reply.log(f"craft from {source}")
     study = Study(out or (named if inside else Path(read.name)))
+    if study.ledger_broken:
+        reply.log(f"{study.root / 'study.json'} cannot be read; every stage is checked again. Whole runs are kept.")
     reply.file("study", study.root)
     return Chain(study, read, source, reply, speed)
 
@@ -60,6 +63,7 @@ class Chain:
     speed: str | None = None
     wall: dict[str, float] = field(default_factory=dict)
     _runs: tuple[Run, ...] | None = None
+    _told: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def keep_speed(self) -> Chain:
         """Take the speed of the plan that the study already holds, when none was given."""
@@ -105,7 +109,7 @@ class Chain:
         inputs = self.inputs(stage)
         files = work()
         wall = time.perf_counter() - started
-        self.study.record(stage, inputs, files, wall)
+        self.study.record(stage, inputs, files, wall, self._told.get(stage))
         self.wall[stage] = round(wall, 3)
         self.reply.log(f"{stage:<8} {wall:6.1f} s")
 
@@ -183,7 +187,10 @@ class Chain:
     def _tow(self) -> Sequence[Path]:
         from towtank.tank.files import run_path
 
-        return [run_path(self.study.root, run.id) for run in self.runs()]
+        runs = self.runs()
+        flags = Counter(flag for run in runs for flag in run.flags)
+        self._told["tow"] = {"runs": len(runs), "levels": sorted({run.level for run in runs}), "flags": dict(flags)}
+        return [run_path(self.study.root, run.id) for run in runs]
 
     def runs(self) -> tuple[Run, ...]:
         """The runs of the plan, or of the runs folder when the study has no plan."""
@@ -192,7 +199,7 @@ class Chain:
 
         if self._runs is None:
             if self.study.plan.exists():
-                self._runs = tow(self.plan(), self.tank(), self.study.root, self.reply.progress)
+                self._runs = tow(self.plan(), self.tank(), self.study.root, Remarks(self.reply))
             elif self.study.runs.is_dir():
                 self._runs = tuple(read_runs(self.study.runs))
             else:
@@ -286,8 +293,7 @@ class Chain:
         self.reply.file("report", self.study.report)
 
     def _publish(self) -> Sequence[Path]:
-        from towtank.report.build import report
+        from towtank.report.build import report_study
 
-        things: list[object] = [self.craft]
-        report(self.study.report, *things)
+        report_study(self.study.root, self.study.report)
         return (self.study.report,)

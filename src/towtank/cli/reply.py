@@ -75,6 +75,27 @@ class Reply:
         return document | ({"error": self.error, "exit_code": self.exit_code} if self.exit_code else {})
 
 
+@dataclass(frozen=True)
+class Remarks:
+    """Progress of a campaign: forwards to the bars, and says which runs had to be made again."""
+
+    reply: Reply
+
+    def start(self, task: str, total: int) -> None:
+        """Forward."""
+        self.reply.progress.start(task, total)
+
+    def step(self, task: str, note: str = "") -> None:
+        """Forward; a run that is made again is told on its own line."""
+        if ": run again, " in note:
+            self.reply.log(f"  {note}")
+        self.reply.progress.step(task, note.partition(":")[0])
+
+    def done(self, task: str) -> None:
+        """Forward."""
+        self.reply.progress.done(task)
+
+
 @contextmanager
 def answering(command: str, as_json: bool = False, debug: bool = False) -> Iterator[Reply]:
     """Run a command's body; turn what it raises into a message and an exit code.

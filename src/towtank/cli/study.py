@@ -91,6 +91,11 @@ class Study:
         except ArtefactError:
             return {}
 
+    @property
+    def ledger_broken(self) -> bool:
+        """True when ``study.json`` exists and cannot be read."""
+        return (self.root / "study.json").exists() and not self.stages()
+
     def written(self, path: Path) -> str:
         """Hash that ``path`` had when a stage wrote it; empty when no stage did."""
         name = path.relative_to(self.root).as_posix()
@@ -107,12 +112,20 @@ class Study:
             return False
         return all(file_hash(self.root / name) == known for name, known in record["files"].items())
 
-    def record(self, stage: str, inputs: Mapping[str, str], files: Iterable[Path], wall_s: float) -> None:
-        """Note that ``stage`` is done."""
+    def record(
+        self,
+        stage: str,
+        inputs: Mapping[str, str],
+        files: Iterable[Path],
+        wall_s: float,
+        summary: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Note that ``stage`` is done. ``summary``: plain content that a command may want again without reading it."""
         from towtank.artefact import write_json
 
         hashes = {path.relative_to(self.root).as_posix(): file_hash(path) for path in files}
-        stages = self.stages() | {stage: {"inputs": dict(inputs), "files": hashes, "wall_s": round(wall_s, 3)}}
+        entry = {"inputs": dict(inputs), "files": hashes, "wall_s": round(wall_s, 3), "summary": dict(summary or {})}
+        stages = self.stages() | {stage: entry}
         write_json(
             self.root / "study.json",
             {"schema": SCHEMA, "stages": stages, "provenance": provenance({"program": program_hash()})},

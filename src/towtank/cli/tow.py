@@ -8,6 +8,9 @@ from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
 from towtank.cli.reply import answering
 
+SHOWN = 8
+"""Remarks listed; the rest is counted."""
+
 
 def tow(craft: StudyArgument = None, out: Out = None, json: Json = False, debug: Debug = False) -> None:
     """Run the captive tests that are not done yet.
@@ -21,10 +24,11 @@ def tow(craft: StudyArgument = None, out: Out = None, json: Json = False, debug:
         chain.prepare()
         chain.make_plan()
         chain.tow()
-        runs = chain.runs()
-        flags = Counter(flag for run in runs for flag in run.flags)
-        levels = sorted({run.level for run in runs})
-        reply.summary |= {"runs": len(runs), "levels": levels, "flags": dict(flags), "stages_s": chain.wall}
-        reply.say(f"{len(runs)} runs ({', '.join(levels)}) in {chain.study.runs}")
-        for flag, number in flags.most_common():
+        summary = chain.study.stages()["tow"]["summary"]
+        reply.summary |= {**summary, "stages_s": chain.wall}
+        reply.say(f"{summary['runs']} runs ({', '.join(summary['levels'])}) in {chain.study.runs}")
+        flags = Counter(summary["flags"]).most_common()
+        for flag, number in flags[:SHOWN]:
             reply.say(f"  {number:4d} x {flag}")
+        if len(flags) > SHOWN:
+            reply.say(f"  and {len(flags) - SHOWN} other remarks; --json lists all")
