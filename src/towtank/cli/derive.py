@@ -35,7 +35,7 @@ def derive(
     """
     with answering("derive", json, debug) as reply:
         from towtank.derive.convert import about_point
-        from towtank.derive.files import write_derivatives
+        from towtank.derive.files import document, write_derivatives
         from towtank.derive.show import table
         from towtank.quantity import si
 
@@ -45,13 +45,10 @@ def derive(
         chain.derive()
         derived = chain.derivatives()
         if point is not None or reference is not None:
-            derived = about_point(
-                derived,
-                derived.reference.origin_from_nose if point is None else point,
-                derived.reference.length if reference is None else reference,
-            )
+            derived = about_point(derived, point, reference)
             path: Path = chain.study.root / "derivatives-about.json"
             write_derivatives(derived, path)
             reply.file("derivatives_about", path)
-        reply.summary |= {"level": derived.level, "terms": derived.as_dict(), "rejected": list(derived.rejected)}
+        content = document(derived)
+        reply.summary |= {key: content[key] for key in ("level", "variant", "reference", "terms", "rejected")}
         reply.say(table(derived))
