@@ -111,17 +111,18 @@ def read_plan(path: Path, craft: Craft) -> Plan:
         )
     if document.get("craft") != craft.name:
         raise PlanError(
-            f"{path} is a plan of {document.get('craft')!r}, not of {craft.name!r}. Amplitudes and fin angles belong to "
-            "a craft; make a plan with `towtank plan`, or correct the name if the craft was only renamed."
+            f"{path} is a plan of {document.get('craft')!r}, not of {craft.name!r}. Amplitudes and fin angles belong "
+            "to a craft; make a plan with `towtank plan`, or correct the name if the craft was only renamed."
         )
     speed = _number(document.get("speed", craft.speed), "m/s", f"{path}: speed")
     tests = document.get("test", [])
     if not isinstance(tests, list) or not all(isinstance(entry, dict) for entry in tests):
         raise PlanError(f"{path}: tests are not a list of tables. Write each as a table headed [[test]].")
-    notes = tuple(str(note) for note in document.get("notes", []))
-    return Plan(
-        craft, speed, tuple(_test(entry, craft, speed, f"{path}: test {i + 1}") for i, entry in enumerate(tests)), notes
-    )
+    notes = document.get("notes", [])
+    if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
+        raise PlanError(f"{path}: notes are not a list of texts. Write notes = [] or a list of texts.")
+    read = (_test(entry, craft, speed, f"{path}: test {i + 1}") for i, entry in enumerate(tests))
+    return Plan(craft, speed, tuple(read), tuple(notes))
 
 
 def _document(path: Path) -> dict[str, Any]:

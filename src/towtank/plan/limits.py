@@ -26,7 +26,7 @@ class Violence:
 
     v, w : max |v| / U and max |w| / U.   p, q, r : max |p|, |q|, |r| times L / U.
     cross_flow : largest tangent of the angle between the axis and the flow at the origin.
-    slowing : largest loss of u over U.   helix : max |p| times the fin-tip radius / U.
+    slowing : largest loss of u in a cycle over U.   helix : max |p| times the fin-tip radius / U.
     fin : largest fin angle [rad].   frequency : w' = frequency times L / U; 0 when steady.
     cycle : lengths travelled per cycle; infinite when steady.
     warnings : limits of the fitted range that are passed, a sentence each.
@@ -76,7 +76,7 @@ LIMITS = (
           "the fins are stalled over most of the cycle", 1, 1),
     Limit("slowing", "loss of speed/U", 0.5, 0.95, "the resistance falls to a quarter within a cycle",
           "the flow along the hull nearly stops or reverses", 1, 1),
-    Limit("frequency", "w L/U", math.nan, 2.0 * math.pi, "unsteady lift reaches the derivatives", _CYCLE, 0, 1),
+    Limit("frequency", "frequency L/U", math.nan, 2.0 * math.pi, "unsteady lift reaches the derivatives", _CYCLE, 0, 1),
     Limit("fin", "fin angle [rad]", FIN_WARNING, math.radians(45.0), "the fins begin to stall",
           "a stalled fin is a plate across the flow, which no fin coefficient represents", 0, 0),
 )  # fmt: skip
@@ -135,7 +135,7 @@ def enforce(test: CaptiveTest, craft: Craft) -> Violence:
     violence = assess(test, craft)
     if violence.refusals and not test.exploratory:
         raise PlanError(
-            f"run {test.name} ({described(test)}) {' It also '.join(violence.refusals)}, or mark the run "
+            f"run {test.name} ({described(test)}) {'. It also '.join(violence.refusals)}, or mark the run "
             "exploratory = true to record it without fitting."
         )
     return violence
@@ -185,15 +185,16 @@ def _measure(test: CaptiveTest, craft: Craft) -> Violence:
     def peak(values: Array) -> float:
         return float(np.abs(values).max())
 
-    angle = peak(np.arctan2(np.hypot(v, w), u))
+    cross = np.hypot(v, w)
+    tangent = np.divide(cross, u, out=np.where(cross > 0.0, np.inf, 0.0), where=u > 0.0)
     return Violence(
         v=peak(v) / U,
         w=peak(w) / U,
         p=peak(p) * L / U,
         q=peak(q) * L / U,
         r=peak(r) * L / U,
-        cross_flow=math.tan(angle) if angle < math.pi / 2.0 else math.inf,
-        slowing=max(1.0 - float(u.min()) / U, 0.0),
+        cross_flow=peak(tangent),
+        slowing=max(1.0 - float(u.min()) / U, 0.0) if period else 0.0,
         helix=peak(p) * radius / U,
         fin=max((abs(delta) for delta in test.fins), default=0.0),
         frequency=frequency,
@@ -207,7 +208,8 @@ def _remedy(test: CaptiveTest, craft: Craft, limit: Limit, value: float) -> str:
     if limit.measure == "fin":
         return f"Keep the fins within {math.degrees(limit.refuse):.3g} deg"
     if limit.measure == "cross_flow" and motion.period == 0.0:
-        return f"Keep the angle within {math.degrees(math.atan(limit.refuse)):.3g} deg"
+        angle = "drift" if motion.kind == "turn" else "angle"
+        return f"Keep the {angle} within {math.degrees(math.atan(limit.refuse)):.3g} deg"
     if motion.period == 0.0:
         return f"Keep the rate below {limit.refuse * test.speed / craft.length:.3g} rad/s"
     frequency = 2.0 * math.pi / motion.period * share ** (1.0 / max(limit.frequency, 1))

@@ -91,6 +91,8 @@ def standard_plan(
     ]
     if fourfold:
         notes.insert(0, "4-fold symmetry: incidence left out; one heave and one pitch run check the ties.")
+    else:
+        notes.insert(0, "no run combines heave and pitch: Xwq is not measured.")
     if not craft.fins:
         notes.insert(0, "no fins: no deflection runs.")
     return Plan(craft, U, tests, tuple(notes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -55,7 +56,7 @@ def tow(
     enforce_plan(plan)
     chosen = _fast_tank() if tank is None else tank
     told: Progress = Silent() if progress is None else progress
-    folder = None if out is None else Path(out)
+    folder = None if out is None else _writable(Path(out))
     runs: list[Run] = []
     told.start(TASK, len(plan.tests))
     try:
@@ -86,6 +87,19 @@ def _fast_tank() -> Tank:
     from towtank.tank.fast.tank import FastTank
 
     return FastTank()
+
+
+def _writable(folder: Path) -> Path:
+    """``folder`` itself, after its ``runs`` was made and found fit to be written: known before a solver is started."""
+    runs = folder / "runs"
+    try:
+        runs.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=runs):
+            return folder
+    except OSError as error:
+        raise ArtefactError(
+            f"cannot write {runs}: {error.strerror or error}. Choose a folder you may write to with --out DIR."
+        ) from error
 
 
 def _recorded(
