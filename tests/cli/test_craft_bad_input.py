@@ -3,9 +3,13 @@
 import re
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from towtank.craft.build import build
 from towtank.craft.hydrostatics import check
 from towtank.craft.library import craft_text, read_craft, write_craft_copy
+from towtank.craft.reading import read_toml
 from towtank.craft.template import template
 from towtank.errors import ArtefactError, CraftError
 
@@ -154,6 +158,15 @@ def test_text_that_is_no_quantity(tmp_path):
 
 def test_truth_value_is_no_number(tmp_path):
     assert "hull.nose: True is not a number" in fault(tmp_path, ('nose       = "0.25 m"', "nose = true"))
+
+
+def test_length_in_a_wrong_unit(tmp_path):
+    message = fault(tmp_path, ('nose       = "0.25 m"', 'nose = "250 km"'))
+    assert "hull.nose: 250 km is no length of a craft: the limits are 1 micrometre and 10 km" in message
+
+
+def test_hull_family_that_is_no_text(tmp_path):
+    assert "hull.kind: ['myring'] is not a hull family" in fault(tmp_path, ('"myring" *$', '["myring"]'))
 
 
 def test_unknown_hull_family(tmp_path):
@@ -326,3 +339,20 @@ def test_copy_into_a_file_is_refused(tmp_path):
     blocked.write_text("a file, not a folder")
     with pytest.raises(ArtefactError, match="cannot write"):
         write_craft_copy("hokie", blocked)
+
+
+JUNK = [[], {}, "", 0, -1, 1e300, True, [[1]], "x y", "5 m", "30 deg", {"value": [1]}, ["a"], "{}", "%s", "1e400 m"]
+
+
+@given(st.sampled_from(["template", "remus100", "suboff-fins"]), st.data())
+@settings(max_examples=60, deadline=None)
+def test_any_value_in_place_of_any_other_is_either_a_craft_or_a_taught_error(base, data):
+    raw = read_toml(template(NAME) if base == "template" else craft_text(base), base)
+    section = data.draw(st.sampled_from(sorted(raw)))
+    key = data.draw(st.sampled_from(sorted(raw[section])))
+    raw[section][key] = data.draw(st.sampled_from(JUNK))
+    try:
+        check(build(raw, base))
+    except CraftError as error:
+        assert re.match(r"\S+ has (one fault|\d+ faults):\n  \S", str(error))
+        assert "pydantic" not in str(error)

@@ -104,10 +104,10 @@ def _assemble(sections: Sections, profile: Profile, fins: tuple[Fin, ...]) -> Cr
     tables: dict[str, Any] = dict(sections.tables)
     origins = sections.origins
     water = _water(tables["conditions"], origins)
-    _, cb, *aside = centre_of_buoyancy(profile, fins)
+    cb = centre_of_buoyancy(profile, fins)[1]
     reference = tables.get("reference")
     origin = value(reference, "origin_from_nose", cb) if reference else cb
-    mass = _mass(sections, profile, water, (origin - cb, *aside))
+    mass = _mass(sections, profile, water, origin - cb)
     if mass is not None:
         sections.faults.extend(_cg_faults(mass, profile, origin))
     if not 0.0 <= origin <= profile.length:
@@ -144,16 +144,16 @@ def _water(conditions: Any, origins: Origins) -> Water:
     )
 
 
-def _mass(sections: Sections, profile: Profile, water: Water, cb: tuple[float, ...]) -> Mass | None:
+def _mass(sections: Sections, profile: Profile, water: Water, level: float) -> Mass | None:
     section: Any = sections.tables["mass"]
     mass = value(section, "mass")
     displaced = _displaced(section, mass, water, sections.faults)
     cg = np.array([value(section.cg, axis) for axis in "xyz"])
-    cg[0] = cb[0] if np.isnan(cg[0]) else cg[0]
+    cg[0] = level if np.isnan(cg[0]) else cg[0]
     inertia = _inertia(sections, uniform_inertia(profile, mass), mass, cg)
     if displaced is None or inertia is None:
         return None
-    return Mass(mass, displaced, (float(cg[0]), float(cg[1]), float(cg[2])), as_rows(inertia), (cb[0], cb[1], cb[2]))
+    return Mass(mass, displaced, (float(cg[0]), float(cg[1]), float(cg[2])), as_rows(inertia))
 
 
 def _displaced(section: Any, mass: float, water: Water, faults: list[str]) -> float | None:

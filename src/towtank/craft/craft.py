@@ -99,15 +99,13 @@ class Mass:
     """Rigid body and buoyancy.
 
     ``mass`` and ``displaced_mass`` [kg], ``cg`` (3,) [m] from the origin, ``inertia`` (3, 3) [kg m2] about the origin
-    (the tensor: off-diagonal entries are minus the products of inertia), ``cb`` (3,) [m]: centre of buoyancy from the
-    origin, zero unless the file moves the origin.
+    (the tensor: off-diagonal entries are minus the products of inertia).
     """
 
     mass: float
     displaced_mass: float
     cg: tuple[float, float, float]
     inertia: tuple[tuple[float, float, float], ...]
-    cb: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ def _one(name: str, content: Any, faults: list[str]) -> Section | None:
     if name != "hull":
         return _section(name, SECTIONS[name], content, faults)
     kind = content.get("kind") if isinstance(content, Mapping) else None
-    if kind not in HULLS:
+    if not isinstance(kind, str) or kind not in HULLS:
         faults.append(f"hull.kind: {kind!r} is not a hull family. {_closest(str(kind), HULLS)}")
         return None
     return _section(name, HULLS[kind], content, faults)

@@ -51,6 +51,10 @@ def _number(unit: str, limit: str = "") -> PlainValidator:
             value = si(table["value"], unit, "@")
         except InputError as error:
             raise ValueError(str(error).removeprefix("@: ")) from None
+        if unit == "m" and (abs(value) > 1e4 or (limit == "positive" and 0.0 < value < 1e-6)):
+            raise ValueError(
+                f"{table['value']} is no length of a craft: the limits are 1 micrometre and 10 km. Check the unit"
+            )
         if not accept(value):
             raise ValueError(f"{table['value']} {fault}")
         return Given(value, source, assumed)
