@@ -351,8 +351,10 @@ def test_any_value_in_place_of_any_other_is_either_a_craft_or_a_taught_error(bas
     section = data.draw(st.sampled_from(sorted(raw)))
     key = data.draw(st.sampled_from(sorted(raw[section])))
     raw[section][key] = data.draw(st.sampled_from(JUNK))
+    told = ""
     try:
         check(build(raw, base))
     except CraftError as error:
-        assert re.match(r"\S+ has (one fault|\d+ faults):\n  \S", str(error))
-        assert "pydantic" not in str(error)
+        told = str(error)
+    assert not told or re.match(r"\S+ has (one fault|\d+ faults):\n  \S", told)
+    assert "pydantic" not in told
