@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_cases import AT_ORIGIN, array, model, numbers, symmetric_added_mass, velocities
+from model_cases import AT_ORIGIN, FEW, array, model, numbers, symmetric_added_mass, velocities
 from scipy.integrate import solve_ivp
 
 from towtank.frames import rotation
@@ -31,11 +31,13 @@ def _skew_and_idle(matrix, nu):
     assert abs(nu @ C @ nu) <= 40 * ROUND_OFF * scale
 
 
+@FEW
 @given(bodies, velocities)
 def test_the_rigid_body_coriolis_load_does_no_work(body, nu):
     _skew_and_idle(coriolis_matrix(body, nu), nu)
 
 
+@FEW
 @given(symmetric_added_mass(), velocities)
 def test_the_added_mass_coriolis_load_does_no_work_in_full_and_reduced_form(values, nu):
     added = added_mass_matrix(values)
@@ -43,6 +45,7 @@ def test_the_added_mass_coriolis_load_does_no_work_in_full_and_reduced_form(valu
     _skew_and_idle(coriolis_reduced(added, nu), nu)
 
 
+@FEW
 @given(symmetric_added_mass(), velocities)
 def test_the_full_coriolis_load_is_kirchhoffs(values, nu):
     M, nu = array(added_mass_matrix(values)), np.array(nu)
@@ -53,6 +56,7 @@ def test_the_full_coriolis_load_is_kirchhoffs(values, nu):
     assert np.allclose(computed, expected, rtol=0, atol=ROUND_OFF * (1 + abs(M).max() * 24))
 
 
+@FEW
 @given(bodies, velocities)
 def test_the_rigid_body_coriolis_load_is_newtons(body, nu):
     M, nu = array(mass_matrix(body)), np.array(nu)
@@ -63,6 +67,7 @@ def test_the_rigid_body_coriolis_load_is_newtons(body, nu):
     assert np.allclose(load, expected, rtol=0, atol=ROUND_OFF * (1 + abs(M).max() * 50))
 
 
+@FEW
 @given(bodies, velocities)
 def test_the_zeros_printed_in_eq_2_14_give_the_same_load_but_no_skew_matrix(body, nu):
     C = array(coriolis_matrix(body, nu))
@@ -75,6 +80,7 @@ def test_the_zeros_printed_in_eq_2_14_give_the_same_load_but_no_skew_matrix(body
     assert np.allclose(abs(printed + printed.T).max(), body.m * max(map(abs, (u, v, w))), rtol=1e-9, atol=atol)
 
 
+@FEW
 @given(velocities)
 def test_the_bracket_of_eq_2_15_lacks_the_products_with_u_and_row_one(nu):
     values = {"Xudot": -3.0, "Yvdot": -90.0, "Zwdot": -80.0, "Kpdot": -2.0, "Mqdot": -70.0, "Nrdot": -60.0,
