@@ -98,7 +98,7 @@ def uncertainty_shares(derivatives: Derivatives, names: Sequence[str] = (), ax: 
     frame(ax, "", "std [% of the value]", zero=False)
     ax.set_xticklabels(names, rotation=90, fontsize=5.6, parse_math=False)
     top = float(np.percentile(percent, 90.0)) if len(names) else 1.0
-    ax.set_ylim(0.0, max(min(1.15 * float(percent.max(initial=1.0)), 2.5 * top), 1.0))
+    ax.set_ylim(0.0, 1.2 * max(min(float(percent.max(initial=1.0)), 2.5 * top), 1.0))
     head(ax, "What the uncertainty is made of", derivatives.level, "1 std, split by variance; taller bars are cut")
     legend(ax)
     return ax

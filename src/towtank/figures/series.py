@@ -20,8 +20,10 @@ from towtank.figures.paper import (
     load_label,
     modelled,
     new_axes,
+    note,
     one_level,
 )  # fmt: skip
+from towtank.frames import Array
 from towtank.symbols import LOADS, RATES
 from towtank.tank.run import Run
 
@@ -114,39 +116,48 @@ def ensemble(run: Run, load: str = "", ax: Axes | None = None) -> Axes:
 
 
 def residual_per_run(runs: Sequence[Run], derivatives: Derivatives, ax: Axes | None = None) -> Axes:
-    """Root mean square of run minus fit, as per cent of the largest load of the same kind of test, for each run.
+    """Root mean square of run minus fit [% of the largest load of its kind of test], run by run, kinds side by side.
 
     Loads below 2 % of the largest force of a run (a moment divided by the length) are left out: symmetry makes them
-    near zero.
+    near zero. The three largest are named; runs that were not fitted stand on a tint.
     """
+    ax = new_axes(ax, width=6.6, height=2.9)
+    runs = sorted(runs, key=lambda run: run.kind)
+    rms = residuals(runs, derivatives)
+    for column, load in enumerate(LOADS):
+        if np.isfinite(rms[:, column]).any():
+            ax.plot(rms[:, column], "o", markersize=2.8, color=PALETTE[column], label=load)
     rejected = {name for name, _ in derivatives.rejected}
-    ax = new_axes(ax, width=6.2, height=max(2.2, 0.85 + 0.105 * len(runs)))
-    scale = {
-        kind: np.max([np.abs(r.loads).max(axis=0) for r in runs if r.kind == kind], axis=0)
-        for kind in {r.kind for r in runs}
-    }
+    for i, run in enumerate(runs):
+        if run.name in rejected or run.exploratory:
+            ax.axvspan(i - 0.5, i + 0.5, color="#f3dcd3", linewidth=0)
+    worst = np.nan_to_num(rms).max(axis=1)
+    for i in np.argsort(worst)[-3:]:
+        note(ax, runs[i].name, (i, worst[i]), (3, 2), ha="left" if i < 0.7 * len(runs) else "right")
+    kinds = [run.kind for run in runs]
+    starts = [kinds.index(kind) for kind in dict.fromkeys(kinds)]
+    for start in starts[1:]:
+        ax.axvline(start - 0.5, color="#c3cad0", linewidth=0.6)
+    ax.set_xticks([start + 0.5 * (kinds.count(kinds[start]) - 1) for start in starts])
+    frame(ax, "", "run - fit, rms [% of largest]", zero=False)
+    ax.set_xticklabels([kinds[start] for start in starts], rotation=90, fontsize="x-small", parse_math=False)
+    ax.set_ylim(bottom=0.0)
+    shade = "; tinted: not fitted" if rejected or any(run.exploratory for run in runs) else ""
+    level = one_level([run.level for run in runs])
+    head(ax, "Residual of every run", level, "the points are misfit, not uncertainty" + shade)
+    legend(ax, ncol=6)
+    return ax
+
+
+def residuals(runs: Sequence[Run], derivatives: Derivatives) -> Array:
+    """Root mean square of run minus fit (n_runs, 6) in per cent; NaN where symmetry makes the load near zero."""
+    largest = np.array([np.abs(run.loads).max(axis=0) for run in runs])
+    kinds = np.array([run.kind for run in runs])
+    out = np.full(largest.shape, np.nan)
     for i, run in enumerate(runs):
         used = run.settled
         rms = np.sqrt(((run.loads - modelled(derivatives, run)[0])[used] ** 2).mean(axis=0))
-        size = np.abs(run.loads).max(axis=0) / np.array([1.0, 1.0, 1.0, run.length, run.length, run.length])
-        for column in range(6):
-            if size[column] > 0.02 * size.max() and scale[run.kind][column] > 0.0:
-                ax.plot(100.0 * rms[column] / scale[run.kind][column], i, "o", markersize=2.8, color=PALETTE[column])
-        if run.name in rejected or run.exploratory:
-            ax.axhspan(i - 0.5, i + 0.5, color="#f3dcd3", linewidth=0)
-    for column, load in enumerate(LOADS):
-        ax.plot([], [], "o", markersize=3, color=PALETTE[column], label=load)
-    ax.set_yticks(range(len(runs)))
-    frame(ax, "rms of run - fit [% of the largest load of this kind of test]", "", zero=False)
-    ax.set_yticklabels([run.name for run in runs], fontsize=5.2, parse_math=False)
-    ax.set_ylim(len(runs) - 0.4, -0.6)
-    ax.set_xlim(left=0.0)
-    shade = "; shaded: not fitted" if rejected or any(run.exploratory for run in runs) else ""
-    head(
-        ax,
-        "Residual of every run",
-        one_level([run.level for run in runs]),
-        "the points are misfit, not uncertainty" + shade,
-    )
-    legend(ax, ncol=6, loc="lower right")
-    return ax
+        size = largest[i] / np.array([1.0, 1.0, 1.0, run.length, run.length, run.length])
+        kept = size > 0.02 * size.max()
+        out[i, kept] = 100.0 * rms[kept] / largest[kinds == run.kind].max(axis=0)[kept]
+    return out

@@ -37,7 +37,7 @@ def side_view(craft: Craft, ax: Axes | None = None) -> Axes:
     frame(ax, "distance aft of the nose [m]", "below axis [m]", zero=False)
     ax.set_aspect("equal", adjustable="datalim")
     ax.invert_yaxis()
-    head(ax, "Side view, starboard", "geometry", GEOMETRY)
+    head(ax, "Side view, starboard", "", GEOMETRY)
     legend(ax, ncol=2)
     return ax
 
@@ -64,7 +64,7 @@ def stern_view(craft: Craft, ax: Axes | None = None) -> Axes:
     frame(ax, "starboard [m]", "down [m]", zero=False)
     ax.set_aspect("equal", adjustable="datalim")
     ax.invert_yaxis()
-    head(ax, "From astern", "geometry", GEOMETRY)
+    head(ax, "From astern", "", GEOMETRY)
     return ax
 
 
@@ -90,11 +90,10 @@ def shaded(vertices: Array, faces: NDArray[np.integer], ax: Axes | None = None) 
     colour = np.clip(light[:, None] * np.array([0.80, 0.87, 0.92]), 0.0, 1.0)[order]
     flat = np.stack([corner @ right, corner @ up], axis=-1)[order]
     ax.add_collection(PolyCollection(list(flat), facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True))
-    ax.set_xlim(flat[..., 0].min(), flat[..., 0].max())
-    ax.set_ylim(flat[..., 1].min(), flat[..., 1].max())
+    ax.autoscale_view()
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_axis_off()
-    head(ax, "Surface from the starboard bow", "geometry", GEOMETRY)
+    head(ax, "Surface from the starboard bow", "", GEOMETRY)
     return ax
 
 

@@ -1,0 +1,119 @@
+"""Page section: simulated manoeuvres with their indices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from towtank.figures import histories, tracks
+from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated, with_std
+from towtank.report.pictures import Sketchbook
+from towtank.report.study import STAGES, Study
+from towtank.trials.trajectory import Trajectory
+
+
+def trials(study: Study, book: Sketchbook) -> Section:
+    """Figures of every kind of trial, then the indices of all of them."""
+    title = "Simulated manoeuvres"
+    it = study.trajectories
+    if not it:
+        return Section("trials", title, (missing("No trial was given.", STAGES["trials"]),))
+    blocks: list[Block] = [_list(it)]
+    blocks += _figures(study, book)
+    blocks.append(_indices(it, study.index))
+    return Section("trials", title, tuple(blocks))
+
+
+def _of(it: Sequence[Trajectory], *words: str) -> list[Trajectory]:
+    """Trials whose kind holds one of ``words``, spaces and hyphens aside."""
+    plain = [word.replace("-", "").replace(" ", "") for word in words]
+    return [t for t in it if any(word in t.kind.replace("-", "").replace(" ", "").replace("_", "") for word in plain)]
+
+
+def _figures(study: Study, book: Sketchbook) -> list[Block]:
+    it = study.trajectories
+    blocks: list[Block] = []
+    for trial in _of(it, "circle")[:2]:
+        blocks.append(book.draw(tracks.turning_circle, trial, caption=_caption(trial)))
+    for trial in _of(it, "spiral")[:1]:
+        blocks.append(book.draw(histories.spiral, trial, caption=_caption(trial)))
+    if out := _of(it, "pullout")[:4]:
+        blocks.append(book.draw(histories.pull_out, out, caption=_caption(out[0])))
+    zigzags = _of(it, "zigzag")[:4]
+    for i in range(0, len(zigzags), 2):
+        pair = zigzags[i : i + 2]
+        calls = [partial(histories.zigzag, trial) for trial in pair]
+        blocks.append(book.panels(calls, " ".join(_caption(trial) for trial in pair), (2.1,), len(calls)))
+    steps = [*_of(it, "headingstep")[:1], *_of(it, "depthstep")[:1]]
+    if steps:
+        calls = [partial(histories.step, trial) for trial in steps]
+        blocks.append(book.panels(calls, " ".join(_caption(trial) for trial in steps), (2.0,), len(calls)))
+    if mission := _of(it, "lawnmower", "mission")[:1]:
+        limit = min((fin.max_angle for fin in study.craft.fins), default=None) if study.craft else None
+        blocks.append(book.draw(tracks.plan_view, mission, caption=_caption(mission[0])))
+        blocks.append(book.draw(histories.fin_angles, mission[0], limit, caption="Fin angles through the mission."))
+        blocks.append(book.draw(tracks.depth_profile, mission, caption="Depth through the mission."))
+    elif it:
+        blocks.append(book.draw(tracks.depth_profile, it[:6], caption="Depth in the trials."))
+    if any(t.delta.shape[1] for t in it):
+        words = (
+            "How hard the fins work. Open-loop trials hold what the trial orders; closed-loop ones show the autopilot."
+        )
+        blocks.append(book.draw(histories.fin_effort, it, caption=words))
+    return blocks
+
+
+def _caption(trial: Trajectory) -> str:
+    ended = "" if trial.status == "done" else f" Ended early: {trial.status}."
+    loop = "Autopilot" if trial.loop == "closed" else "Open loop"
+    return f"{trial.kind.capitalize()} {trial.name}. {loop}, nominal model.{ended}"
+
+
+def _list(it: Sequence[Trajectory]) -> Table:
+    rows = tuple(
+        (t.name, t.kind, t.loop, number(float(t.time[-1] - t.time[0])), number(float(abs(t.nu[0, 0]))), t.status)
+        for t in it
+    )
+    head = ("Trial", "Kind", "Loop", "Lasts [s]", "Speed at the start [m/s]", "Ended")
+    level = " + ".join(dict.fromkeys(t.level for t in it))
+    return Table("Trials", head, rows, stated(level, "nominal model; uncertainty of the indices in their own table"))
+
+
+def _indices(it: Sequence[Trajectory], index: Mapping[str, Any]) -> Table:
+    recorded = {str(entry.get("name")): entry.get("indices", {}) for entry in index.get("trials", ())}
+    rows: list[tuple[str, ...]] = []
+    some = False
+    for trial in it:
+        known = recorded.get(trial.name, {})
+        for name, (value, unit) in trial.indices.items():
+            std = known.get(name, {}).get("std") if isinstance(known.get(name), Mapping) else None
+            some = some or std is not None
+            mean, spread = with_std(float(value), None if std is None else float(std))
+            rows.append((trial.name, name.replace("_", " "), mean, spread, unit))
+    level = " + ".join(dict.fromkeys(t.level for t in it))
+    words = (
+        "std from the uncertainty of the derivatives; - where it was not computed"
+        if some
+        else "not computed for these trials"
+    )
+    more = "Angles in the unit stated; heading positive to starboard, depth downwards"
+    return Table("Indices", ("Trial", "Index", "Value", "std", "Unit"), tuple(rows), stated(level, words, more=more))
+
+
+def headline(it: Sequence[Trajectory]) -> list[tuple[str, str, str]]:
+    """A few indices for the summary: (words, value, unit)."""
+    wanted = (("circle", "tactical_diameter"), ("circle", "advance"), ("zigzag", "first_overshoot"))
+    rows = []
+    for kind, key in wanted:
+        for trial in _of(it, kind)[:1]:
+            for name, (value, unit) in trial.indices.items():
+                if name.replace(" ", "_").startswith(key):
+                    rows.append((f"{name.replace('_', ' ').capitalize()}, {trial.name}", number(float(value)), unit))
+                    break
+    return rows
+
+
+def remarks(it: Sequence[Trajectory]) -> list[Block]:
+    """One paragraph for each trial that ended early."""
+    return [Text(f"Trial {t.name} ended early: {t.status}.", "bad") for t in it if t.status != "done"]

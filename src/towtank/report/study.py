@@ -1,0 +1,254 @@
+"""What a report is made from: the nouns of a study, given as objects or read from a study folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import partial
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from towtank.artefact import read_json
+from towtank.craft.craft import Craft
+from towtank.derive.table import Derivatives
+from towtank.errors import ArtefactError, InputError, TowtankError
+from towtank.plan.kinds import Plan
+from towtank.tank.run import Run
+from towtank.trials.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from towtank.model.equations import Model
+
+STAGES = {
+    "craft": "Pass the Craft, or run `towtank new`.",
+    "plan": "Pass the Plan, or run `towtank plan`.",
+    "runs": "Pass the runs, or run `towtank tow`.",
+    "derivatives": "Pass the Derivatives, or run `towtank derive`.",
+    "trials": "Pass trajectories, or run `towtank trial`.",
+    "verdict": "Pass the Verdict, or run `towtank assess`.",
+    "grid": "The fast tank has no mesh; a mesh study belongs to CFD runs.",
+    "validation": "Run `make validate`, which compares the fast tank with published tests.",
+}
+"""Stage -> what to do when it has left nothing."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything a report may show; any part may be absent.
+
+    verdict, index, grid, validation : documents as in verdict.json, trials/index.json, grid.json, validation.json.
+    problems : (stage, message) of files that exist and cannot be read.
+    remarks : what the reader must know about where a part came from.
+    """
+
+    craft: Craft | None = None
+    plan: Plan | None = None
+    runs: tuple[Run, ...] = ()
+    derivatives: Derivatives | None = None
+    model: Model | None = None
+    trajectories: tuple[Trajectory, ...] = ()
+    verdict: Mapping[str, Any] = field(default_factory=dict)
+    index: Mapping[str, Any] = field(default_factory=dict)
+    grid: Mapping[str, Any] = field(default_factory=dict)
+    validation: Mapping[str, Any] = field(default_factory=dict)
+    problems: tuple[tuple[str, str], ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """Every level of evidence met, in the order of the chain."""
+        found = [run.level for run in self.runs]
+        found += [self.derivatives.level] if self.derivatives else []
+        found += [trial.level for trial in self.trajectories]
+        found += [str(self.verdict["level"])] if self.verdict.get("level") else []
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Stages that left nothing."""
+        held = {
+            "craft": self.craft, "plan": self.plan, "runs": self.runs, "derivatives": self.derivatives,
+            "trials": self.trajectories, "verdict": self.verdict, "grid": self.grid, "validation": self.validation,
+        }  # fmt: skip
+        return tuple(stage for stage, content in held.items() if not content)
+
+
+def gather(things: Iterable[Any]) -> Study:
+    """Sort ``things`` into a Study: Craft, Plan, Run, Derivatives, Model, Trajectory, Verdict, or sequences of them.
+
+    Raises
+    ------
+    InputError
+        Something that is none of these, or two of what there can be one of.
+    """
+    held: dict[str, Any] = {"runs": [], "trajectories": []}
+    for thing in _flat(things):
+        name = _part(thing)
+        if name in ("runs", "trajectories"):
+            held[name].append(thing)
+        elif name in held and held[name] is not thing:
+            raise InputError(
+                f"report: two things are a {name}. A report is about one craft and one set of coefficients."
+            )
+        else:
+            held[name] = thing
+    if "verdict" in held:
+        held["verdict"] = document(held["verdict"])
+    study = Study(**{**held, "runs": tuple(held["runs"]), "trajectories": tuple(held["trajectories"])})
+    return completed(study)
+
+
+def completed(study: Study) -> Study:
+    """Fill what follows from the rest: craft and derivatives of a model, craft of a plan, the shipped validation."""
+    craft, derivatives, remarks = study.craft, study.derivatives, study.remarks
+    if study.model is not None:
+        craft, derivatives = craft or study.model.craft, derivatives or study.model.derivatives
+    if craft is None and study.plan is not None:
+        craft = study.plan.craft
+    if craft is None and study.runs:
+        craft = _from_library(study.runs[0])
+        if craft is not None:
+            words = "The craft was not given; the library's craft of the same name, length, origin and water is shown."
+            remarks = (*remarks, words)
+    study = replace(study, craft=craft, derivatives=derivatives, remarks=remarks)
+    if study.model is None and craft is not None and derivatives is not None:
+        study = _with_model(study, craft, derivatives)
+    return study if study.validation else replace(study, validation=shipped_validation())
+
+
+def _with_model(study: Study, craft: Craft, derivatives: Derivatives) -> Study:
+    from towtank.model.equations import Model
+
+    try:
+        return replace(study, model=Model(craft, derivatives))
+    except TowtankError as error:
+        return replace(study, problems=(*study.problems, ("model", str(error))))
+
+
+def _from_library(run: Run) -> Craft | None:
+    from towtank.craft.library import library_names, read_craft
+
+    if run.craft not in library_names():
+        return None
+    craft = read_craft(run.craft)
+    same = (craft.length, craft.origin_from_nose, craft.water.density) == (
+        run.length, run.origin_from_nose, run.density,
+    )  # fmt: skip
+    return craft if same else None
+
+
+def _flat(things: Iterable[Any]) -> Iterator[Any]:
+    for thing in things:
+        if isinstance(thing, list | tuple):
+            yield from _flat(thing)
+        elif thing is not None:
+            yield thing
+
+
+def _part(thing: Any) -> str:
+    from towtank.model.equations import Model
+    from towtank.verdict.assess import Verdict
+
+    kinds: tuple[tuple[type, str], ...] = (
+        (Craft, "craft"), (Plan, "plan"), (Run, "runs"), (Derivatives, "derivatives"), (Model, "model"),
+        (Trajectory, "trajectories"), (Verdict, "verdict"),
+    )  # fmt: skip
+    for kind, name in kinds:
+        if isinstance(thing, kind):
+            return name
+    names = ", ".join(kind.__name__ for kind, _ in kinds)
+    raise InputError(f"report: a {type(thing).__name__} cannot be shown. Give {names}, or sequences of them.")
+
+
+def document(thing: Any) -> Any:
+    """A noun as plain mappings and lists, keys as in its dataclass."""
+    if is_dataclass(thing) and not isinstance(thing, type):
+        return {item.name: document(getattr(thing, item.name)) for item in fields(thing)}
+    if isinstance(thing, Mapping):
+        return {str(key): document(value) for key, value in thing.items()}
+    if isinstance(thing, list | tuple):
+        return [document(value) for value in thing]
+    return thing
+
+
+def shipped_validation() -> Mapping[str, Any]:
+    """The validation table that ships with the package; empty when it holds none."""
+    path = Path(str(resources.files("towtank.report"))) / "validation.json"
+    return read_json(path, "towtank/validation/1") if path.exists() else {}
+
+
+def read_study(folder: Path | str) -> Study:
+    """Read what a study folder holds; a stage that is absent or unreadable is named in the page, not fatal.
+
+    Raises
+    ------
+    ArtefactError
+        The folder does not exist.
+    """
+    root = Path(folder)
+    if not root.is_dir():
+        raise ArtefactError(f"{root} is not a folder. Give the study folder that `towtank run` wrote, with --out DIR.")
+    problems: list[tuple[str, str]] = []
+
+    def attempt(stage: str, there: Path, read: Callable[[], Any], empty: Any = None) -> Any:
+        if not there.exists():
+            return empty
+        try:
+            return read()
+        except TowtankError as error:
+            problems.append((stage, str(error)))
+            return empty
+
+    from towtank.craft.library import read_craft
+    from towtank.derive.files import read_derivatives
+    from towtank.plan.files import read_plan
+
+    files = {name: root / name for name in ("craft.toml", "plan.toml", "runs", "derivatives.json", "trials")}
+    craft = attempt("craft", files["craft.toml"], lambda: read_craft(files["craft.toml"]))
+    plan = attempt("plan", files["plan.toml"], lambda: read_plan(files["plan.toml"], craft)) if craft else None
+    study = Study(
+        craft=craft,
+        plan=plan,
+        runs=_in_plan(plan, _runs(files["runs"], attempt)),
+        derivatives=attempt(
+            "derivatives", files["derivatives.json"], lambda: read_derivatives(files["derivatives.json"])
+        ),
+        trajectories=attempt("trials", files["trials"], lambda: _trajectories(files["trials"]), ()),
+        verdict=attempt(
+            "verdict", root / "verdict.json", lambda: read_json(root / "verdict.json", "towtank/verdict/1"), {}
+        ),
+        index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
+        grid=attempt("grid", root / "grid.json", lambda: read_json(root / "grid.json", "towtank/grid/1"), {}),
+    )
+    return completed(replace(study, problems=tuple(problems)))
+
+
+def _runs(folder: Path, attempt: Callable[..., Any]) -> tuple[Run, ...]:
+    """Every whole run; of two with one name the file written last. A broken one becomes a problem."""
+    from towtank.tank.files import read_run
+
+    latest: dict[str, Run] = {}
+    for path in sorted(folder.glob("*/run.nc"), key=lambda path: path.stat().st_mtime):
+        run = attempt("runs", path, partial(read_run, path))
+        if run is not None:
+            latest[run.name] = run
+    return tuple(latest.values())
+
+
+def _in_plan(plan: Plan | None, runs: tuple[Run, ...]) -> tuple[Run, ...]:
+    """Runs in the order of the plan; those of no test of it come last."""
+    if plan is None:
+        return tuple(runs)
+    order = {test.name: i for i, test in enumerate(plan.tests)}
+    return tuple(sorted(runs, key=lambda run: order.get(run.name, len(order))))
+
+
+def _index(folder: Path) -> dict[str, Any]:
+    return read_json(folder / "index.json", "towtank/trials/1")
+
+
+def _trajectories(folder: Path) -> tuple[Trajectory, ...]:
+    from towtank.trials.files import read_trajectory
+
+    return tuple(read_trajectory(path) for path in sorted(folder.glob("*.nc")))
