@@ -45,7 +45,9 @@ def fourier(runs: Sequence[Run], samples: Samples) -> dict[str, dict[str, float]
                the quadratic term 5.9 times; the regression uses several amplitudes instead.
     """
     return {
-        name_of(run, runs): _one(run, samples, i) for i, run in enumerate(runs) if run.kind in DRIVEN and not run.steady
+        name_of(run, runs): {term: float(value) for term, value in _one(run, samples, i).items()}
+        for i, run in enumerate(runs)
+        if run.kind in DRIVEN and not run.steady
     }
 
 
@@ -66,7 +68,7 @@ def _one(run: Run, samples: Samples, number: int) -> dict[str, float]:
     out: dict[str, float] = {}
     for name in _ODD[run.kind]:
         out |= _odd(name, rate, drive, abs(u), w, load[:, LOADS.index(name)])
-    return {k: v for k, v in (out | _axial(rate, drive, u, load[:, 0]) | _even(load, run.kind)).items()}
+    return out | _axial(rate, drive, u, load[:, 0]) | _even(load, run.kind)
 
 
 def _odd(name: str, rate: str, drive: complex, u: float, w: float, load: Array) -> dict[str, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from towtank.derive import weights
 from towtank.derive.cycles import Samples, scatter
 from towtank.derive.expand import Expansion
-from towtank.derive.identify import Solved, weighted
+from towtank.derive.identify import Solved
 from towtank.derive.regress import solve
 from towtank.derive.select import Choice, independent
 from towtank.derive.system import build
@@ -84,14 +84,13 @@ def tie_gaps(runs: Sequence[Run], samples: Samples, solved: Solved) -> dict[str,
     scale = weights.load_scale(system)
     kept, reasons = independent(system.matrix / scale[system.load][:, None], names)
     free, system = free.keep([names[i] for i in kept], reasons), system.keep(kept)
-    own = weighted(runs, nominal, free, system, solved.spread, solved.share)
+    own = solve(system, solved.weight).unknowns[:, 0]
     out = {}
     for term, (base, sign) in FOURFOLD_TIES.items():
         if term in system.names and base in solved.system.names:
-            i = system.names.index(term)
             tied = sign * float(solved.fit.unknowns[solved.system.names.index(base), 0])
-            value, std = float(own.fit.unknowns[i, 0]), float(np.sqrt(max(own.covariance[i, i], 0.0)))
-            out[term] = {"untied": value, "std": std, "tied": tied, "difference": value - tied}
+            value = float(own[system.names.index(term)])
+            out[term] = {"untied": value, "tied": tied, "difference": value - tied}
     return out
 
 

@@ -20,7 +20,9 @@ POOLED = 0.5
 
 @dataclass(frozen=True)
 class Fit:
-    """unknowns (n, 1 + members), the nominal first; condition number of the column-scaled weighted matrix;
+    """A solved system.
+
+    unknowns (n, 1 + members), the nominal first.   condition : number of the column-scaled weighted matrix.
     root (n, n) : upper triangle R of its QR; scale (n,) : the column norms; weighted (rows, n), error (rows,).
     """
 
@@ -33,7 +35,7 @@ class Fit:
 
 
 def solve(system: System, weight: Array) -> Fit:
-    """theta = (A^T W A)^-1 A^T W b by QR of the column-scaled matrix, for all right-hand sides at once.
+    """Solve theta = (A^T W A)^-1 A^T W b by QR of the column-scaled matrix, for all right-hand sides at once.
 
     weight : (R, 6), of each load of each run.
 
@@ -58,7 +60,7 @@ class Units:
     """The independent units of the data, row by row. block (rows,) : the unit; load (rows,) : which of the six loads.
 
     pool (rows,) : number of the kind of a steady run, -1 for an oscillation. A steady run is a single condition, so
-    the runs of one kind share half of an error covariance between their loads; an oscillation is judged by its own cycles.
+    the runs of one kind share half of an error covariance; an oscillation is judged by its own cycles.
     """
 
     block: NDArray[np.intp]
@@ -73,8 +75,8 @@ def block_covariance(fit: Fit, units: Units, misfit: float) -> tuple[Array, int]
 
     Oscillations: the block jackknife, the sum over blocks of the squared change of the result when that block is left
     out, times (G - 1) / G. Samples within a block may be correlated in any way. A direction that rests on one block
-    alone has no such change; it gets ``misfit``, with the block counted as one observation. Steady runs: the mean of the
-    jackknife over runs and of the residual covariance of their kind over its degrees of freedom.
+    alone has no such change; it gets ``misfit``, with the block counted as one observation. Steady runs: the mean of
+    the jackknife over runs and of the residual covariance of their kind over its degrees of freedom.
 
     Source     bellmccaffrey2002 (their jackknife form, CR3); cameronmiller2015, section VI.
     Departure  Steady runs are half pooled by kind: the jackknife alone is erratic where a term rests on a few of them

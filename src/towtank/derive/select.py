@@ -145,10 +145,10 @@ def independent(matrix: Array, names: Sequence[str]) -> tuple[list[int], dict[st
     matrix : (rows, n), columns in order of precedence.
     """
     norm = np.linalg.norm(matrix, axis=0)
-    unit = matrix / np.where(norm > 0.0, norm, 1.0)
+    unit = np.linalg.qr(matrix / np.where(norm > 0.0, norm, 1.0), mode="r")
     kept: list[int] = []
     reasons: dict[str, str] = {}
-    basis = np.zeros((len(matrix), 0))
+    basis = np.zeros((len(unit), 0))
     for j, name in enumerate(names):
         rest = unit[:, j] - basis @ (basis.T @ unit[:, j])
         rest -= basis @ (basis.T @ rest)

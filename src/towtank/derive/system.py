@@ -1,11 +1,12 @@
 """The linear system of the regression, compressed without loss.
 
 Each load of each period of each run is reduced by QR to as many rows as it has active columns; what is orthogonal to
-them is kept as a sum of squares. Every weighting of runs, loads and periods can then be solved from a few thousand rows.
+them is kept as a sum of squares. Every weighting of runs and loads can then be solved from a few thousand rows.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,7 +96,7 @@ def _blocks(samples: Samples) -> list[tuple[int, int]]:
     """First and last-plus-one sample of each run and period."""
     change = np.flatnonzero(np.diff(samples.run) | np.diff(samples.period)) + 1
     edges = np.concatenate([[0], change, [len(samples.run)]])
-    return [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
 def _compress(a: Array, b: Array) -> tuple[Array, Array, float]:
