@@ -81,6 +81,11 @@ def read_derivatives(path: Path | str) -> Derivatives:
         ) from None
 
 
+def from_document(content: dict[str, Any]) -> Derivatives:
+    """Derivatives of the content that ``document`` gives. KeyError, TypeError or ValueError when it is not whole."""
+    return _derivatives(content)
+
+
 def _derivatives(content: dict[str, Any]) -> Derivatives:
     names = tuple(content["order"])
     unknown = [name for name in names if name not in TERMS]

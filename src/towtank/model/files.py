@@ -12,11 +12,11 @@ import numpy as np
 from towtank.artefact import read_json, write_json
 from towtank.craft.craft import Craft, Fin, Mass, Profile, Propeller
 from towtank.craft.hull import Ellipsoid, Myring, Offsets, Suboff
-from towtank.derive.table import Derivatives, Reference
+from towtank.derive.files import document as derivatives_document
+from towtank.derive.files import from_document as derivatives_of
 from towtank.errors import ArtefactError
 from towtank.model.equations import Model, ModelOptions
 from towtank.provenance import digest, provenance
-from towtank.symbols import TERMS
 from towtank.water import Water
 
 SCHEMA = "towtank/model/1"
@@ -35,10 +35,8 @@ def write_model(model: Model, path: str | Path) -> Path:
         "craft": _craft_document(craft),
         "options": {**asdict(model.options), "centre_of_buoyancy": [model.body.xB, model.body.yB, model.body.zB]},
         "mass_matrix": model.mass_matrix,
-        "derivatives": _derivatives_document(derivatives),
-        "provenance": provenance(
-            {"craft": digest(craft), "derivatives": digest(derivatives.as_dict())}, derivatives=derivatives.provenance
-        ),
+        "derivatives": derivatives_document(derivatives),
+        "provenance": provenance({"craft": digest(craft), "derivatives": digest(derivatives.as_dict())}),
     }
     return write_json(Path(path), document)
 
@@ -57,10 +55,10 @@ def read_model(path: str | Path) -> Model:
         options = document["options"]
         return Model(
             _craft(document["craft"]),
-            _derivatives(document["derivatives"]),
+            derivatives_of(document["derivatives"]),
             ModelOptions(**{**options, "centre_of_buoyancy": tuple(options["centre_of_buoyancy"])}),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ArtefactError(
             f"{path}: an entry is missing or cannot be used ({type(error).__name__}: {error}). Write the file again "
             "with `towtank derive`."
@@ -106,59 +104,3 @@ def _tuples(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _tuples(item) for key, item in value.items()}
     return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
-
-
-_PARTS = ("fit", "mesh", "model")
-
-
-def _derivatives_document(d: Derivatives) -> dict[str, Any]:
-    std = {part: np.sqrt(np.diag(getattr(d, f"covariance_{part}"))) for part in _PARTS}
-    total = np.sqrt(np.diag(d.covariance))
-    return {
-        "craft": d.craft,
-        "level": d.level,
-        "variant": d.variant,
-        "reference": asdict(d.reference),
-        "terms": {
-            name: {
-                "value": d.values[i],
-                "std": total[i],
-                "unit": TERMS[name].unit,
-                "std_parts": {part: std[part][i] for part in _PARTS},
-                "runs": d.runs.get(name, ()),
-            }
-            for i, name in enumerate(d.names)
-        },
-        "order": d.names,
-        "covariance_parts": {part: getattr(d, f"covariance_{part}") for part in _PARTS},
-        "origin": dict(d.origin),
-        "origin_std": dict(d.origin_std),
-        "rejected": d.rejected,
-        "quality": d.quality,
-        "provenance": d.provenance,
-    }
-
-
-def _derivatives(document: Mapping[str, Any]) -> Derivatives:
-    names = tuple(document["order"])
-    terms, size = document["terms"], len(names)
-    fit, mesh, model = (
-        np.asarray(document["covariance_parts"][part], dtype=float).reshape(size, size) for part in _PARTS
-    )
-    return Derivatives(
-        craft=document["craft"],
-        level=document["level"],
-        variant=document["variant"],
-        reference=Reference(**document["reference"]),
-        names=names,
-        values=np.array([float(terms[name]["value"]) for name in names]),
-        covariance_fit=fit,
-        covariance_mesh=mesh,
-        covariance_model=model,
-        runs={name: tuple(terms[name]["runs"]) for name in names},
-        rejected=tuple((run, why) for run, why in document["rejected"]),
-        origin=document["origin"],
-        origin_std=document["origin_std"],
-        quality=document["quality"],
-        provenance=document["provenance"],
-    )
