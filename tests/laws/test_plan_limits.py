@@ -121,6 +121,7 @@ def test_stalled_fins_are_warned_of_and_plates_refused():
         (captive(Sway(U, 0.1, 0.2), samples=8), "third harmonic"),
         (captive(Sway(U, 0.1, 0.2), periods=0), "periods"),
         (CaptiveTest("run-1", -1.0, Drift(U, 0.0)), "speed"),
+        (CaptiveTest("run-1", 2.0, Drift(1.0, 0.0)), "one speed"),
     ],
 )
 def test_what_cannot_be_recorded_is_refused_even_when_exploratory(test, words):

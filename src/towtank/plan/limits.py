@@ -230,6 +230,10 @@ def _refuse_unrecordable(test: CaptiveTest, craft: Craft) -> None:
         raise PlanError(f"run {test.name}: a fin angle is not finite. Give finite angles.")
     if not test.speed > 0.0:
         raise PlanError(f"run {test.name}: speed {test.speed:g} m/s is not positive. Give the speed ahead.")
+    if getattr(test.motion, "speed", test.speed) != test.speed:
+        raise PlanError(
+            f"run {test.name}: the motion's speed is not that of the test, {test.speed:g} m/s. Give one speed."
+        )
     if test.motion.period and test.periods < 1:
         raise PlanError(f"run {test.name}: {test.periods} periods. Run 3: the first is dropped, two are analysed.")
     if test.motion.period and test.samples < SAMPLES_PER_PERIOD:
