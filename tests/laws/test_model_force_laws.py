@@ -176,9 +176,23 @@ def test_a_propeller_balances_the_resistance_at_its_speed_and_pulls_more_below()
     assert loads[0] < slow < 0.9 * density * n**2 * 0.3**4 * 0.45
 
 
-def test_a_propeller_that_cannot_balance_the_resistance_is_refused():
-    with pytest.raises(CraftError, match="balances the resistance"):
-        model(propeller=Propeller(0.05, 4.9, table=((0.0, 0.45, 0.07), (0.1, 0.4, 0.06))))
+def test_a_propeller_table_that_ends_early_is_carried_on_straight_to_zero_thrust():
+    short = Propeller(0.3, 4.9, table=((0.0, 0.4, 0.06), (0.1, 0.36, 0.055)))
+    screw = model(propeller=short).constants.screw
+    assert (screw.advance[-1], screw.kt[-1], screw.kq[-1]) == pytest.approx((1.0, 0.0, 0.01))
+    assert 0.1 < screw.balance < 1.0
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (((0.0, -0.1, 0.07), (0.3, -0.2, 0.06)), "balances the resistance"),
+        (((0.3, 0.4, 0.07), (0.0, 0.5, 0.06)), "rising J"),
+    ],
+)
+def test_a_propeller_that_cannot_balance_the_resistance_is_refused(table, message):
+    with pytest.raises(CraftError, match=message):
+        model(propeller=Propeller(0.3, 4.9, table=table))
 
 
 @FEW

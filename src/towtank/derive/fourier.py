@@ -68,7 +68,7 @@ def _one(run: Run, samples: Samples, number: int) -> dict[str, float]:
     out: dict[str, float] = {}
     for name in _ODD[run.kind]:
         out |= _odd(name, rate, drive, abs(u), w, load[:, LOADS.index(name)])
-    return out | _axial(rate, drive, u, load[:, 0]) | _even(load, run.kind)
+    return out | _axial(rate, drive, samples.nu[at], load[:, 0], cycles) | _even(load, run.kind)
 
 
 def _odd(name: str, rate: str, drive: complex, u: float, w: float, load: Array) -> dict[str, float]:
@@ -86,14 +86,20 @@ def _odd(name: str, rate: str, drive: complex, u: float, w: float, load: Array) 
     return out
 
 
-def _axial(rate: str, drive: complex, u: float, load: Array) -> dict[str, float]:
-    """X is even in the driven velocity: its second harmonic gives Xvv and the like, its mean Xuu."""
+def _axial(rate: str, drive: complex, nu: Array, load: Array, cycles: int) -> dict[str, float]:
+    """X = Xuu |u| u + Xvv v v and the like: two unknowns from the mean and the second harmonic in phase with v v.
+
+    In yaw and pitch u u has a second harmonic of its own, since the speed along the path varies.
+    """
     term = f"X{rate}{rate}"
     if term not in TERMS:
         return {}
-    amplitude = abs(drive)
-    value = float((load[2] / (drive / amplitude) ** 2).real) / (0.5 * amplitude**2)
-    return {term: value, "Xuu": (float(load[0].real) - 0.5 * value * amplitude**2) / (abs(u) * u)}
+    u, x = nu[:, 0], nu[:, RATES.index(rate)]
+    phase = (drive / abs(drive)) ** 2
+    squares = harmonics(np.stack([np.abs(u) * u, x * x], axis=1), 2, cycles)
+    matrix = np.stack([squares[0].real, (squares[2] / phase).real])
+    ahead, across = np.linalg.solve(matrix, np.array([load[0].real, (load[2] / phase).real]))
+    return {term: float(across), "Xuu": float(ahead)}
 
 
 def _surge(drive: complex, u: float, w: float, load: Array) -> dict[str, float]:

@@ -145,7 +145,7 @@ def independent(matrix: Array, names: Sequence[str]) -> tuple[list[int], dict[st
     matrix : (rows, n), columns in order of precedence.
     """
     norm = np.linalg.norm(matrix, axis=0)
-    unit = np.linalg.qr(matrix / np.where(norm > 0.0, norm, 1.0), mode="r")
+    unit = np.asarray(np.linalg.qr(matrix / np.where(norm > 0.0, norm, 1.0), mode="r"))
     kept: list[int] = []
     reasons: dict[str, str] = {}
     basis = np.zeros((len(unit), 0))
