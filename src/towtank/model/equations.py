@@ -299,8 +299,6 @@ def _listed(vector: Sequence[Scalar] | np.ndarray[Any, Any]) -> list[Scalar]:
 
 def _inverse(matrix: np.ndarray[Any, Any], craft: str) -> np.ndarray[Any, Any]:
     """Inverse with exact zeros where the block structure has them; refuses a mass that is not positive."""
-    from scipy.linalg import lu_factor, lu_solve
-
     smallest = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min())
     if not smallest > 0.0:
         raise InputError(
@@ -308,7 +306,7 @@ def _inverse(matrix: np.ndarray[Any, Any], craft: str) -> np.ndarray[Any, Any]:
             f"{smallest:.3g}). Added-mass derivatives such as Yvdot act on the body and are negative in this "
             "project; check their signs and the craft's inertia."
         )
-    inverse = np.asarray(lu_solve(lu_factor(matrix), np.eye(6)))
+    inverse = np.linalg.solve(matrix, np.eye(6))
     return np.where(np.abs(inverse) < 1e-15 * np.sqrt(np.outer(np.diag(inverse), np.diag(inverse))), 0.0, inverse)
 
 

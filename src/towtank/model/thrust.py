@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from towtank.craft.craft import Craft
 from towtank.errors import CraftError
+from towtank.frames import Array
 from towtank.model.algebra import MATH, Ops, Scalar, interpolate
 
 _FORCE_FLOOR = 1e-30
@@ -60,7 +61,7 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
         raise CraftError(
             f"{where}: the table needs a positive diameter and at least two rows (J, KT, KQ) with rising J."
         )
-    advance, kt, kq = (tuple(float(x) for x in column) for column in table.T)
+    advance, kt, kq = (tuple(float(x) for x in column) for column in _to_zero_thrust(table).T)
     demand = (
         resistance
         / (craft.water.density * propeller.diameter**2)
@@ -71,10 +72,10 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
         return float(interpolate(j, advance, kt, MATH)) - demand * j * j
 
     low, high = max(advance[0], 0.0), advance[-1]
-    if resistance <= 0.0 or excess(low) <= 0.0 or excess(high) >= 0.0:
+    if resistance <= 0.0 or high <= low or excess(low) <= 0.0 or excess(high) >= 0.0:
         raise CraftError(
             f"{where}: no advance ratio between {low:g} and {high:g} gives a thrust that balances the resistance "
-            f"{resistance:.4g} u2 N. Extend the table, correct the diameter, or leave the table out."
+            f"{resistance:.4g} u2 N. Correct the table or the diameter, or leave the table out."
         )
     balance = float(brentq(excess, low, high, xtol=1e-14))
     return Screw(
@@ -88,6 +89,19 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
         kq,
         balance,
     )
+
+
+def _to_zero_thrust(table: Array) -> Array:
+    """``table`` (rows J, KT, KQ) carried on along its last segment to KT = 0, when it ends earlier.
+
+    Valid      Open-water curves are nearly straight down to zero thrust; KQ is not let below zero.
+    """
+    before, last = table[-2], table[-1]
+    slope = (last - before) / (last[0] - before[0])
+    if last[1] <= 0.0 or slope[1] >= 0.0:
+        return table
+    end = last + slope * (-last[1] / slope[1])
+    return np.vstack([table, [end[0], 0.0, max(float(end[2]), 0.0)]])
 
 
 def steady_thrust(resistance: float, speed: Scalar, ops: Ops) -> Scalar:
@@ -108,7 +122,7 @@ def thrust_load(screw: Screw | None, command: Scalar, u: Scalar, ops: Ops) -> tu
     u : speed of the craft through the water along x [m/s].
 
     Source     T = (1 - t) rho n|n| D^4 KT(J), J = (1 - w) u / (n D), K = -+ rho n|n| D^5 KQ(J) (THEORY section 6).
-    Valid      Ahead; beyond its ends the table is held.
+    Valid      Ahead. A table that ends before zero thrust is carried on straight to it; beyond, it is held.
     """
     if screw is None:
         return command, 0.0

@@ -10,6 +10,7 @@ import numpy as np
 from towtank.craft.craft import Craft
 from towtank.derive.table import Derivatives, Reference
 from towtank.errors import InputError
+from towtank.frames import Array
 from towtank.symbols import LOADS, RATES, TERMS
 
 VARIANTS = ("lumped", "split")
@@ -67,10 +68,8 @@ def replaced(derivatives: Derivatives, values: Mapping[str, float]) -> Derivativ
     merged = {**derivatives.as_dict(), **{name: float(value) for name, value in values.items()}}
     extra = len(merged) - len(derivatives.names)
 
-    def grown(
-        covariance: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
-    ) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        return np.pad(covariance, ((0, extra), (0, extra)))
+    def grown(covariance: Array) -> Array:
+        return np.pad(covariance, ((0, extra), (0, extra))) if extra else covariance
 
     return replace(
         derivatives,
