@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +42,7 @@ def open_chain(reply: Reply, craft: str | None, out: Path | None, speed: str | N
     if craft is None and not inside:
         raise InputError(f"{named.resolve()} holds no craft.toml. Name a craft, or a study folder with --out DIR.")
     source = str(named / "craft.toml") if inside else str(craft)
-    read = read_craft(source)
+    read = _at_speed(read_craft(source), speed)
     if inside:
         reply.log(f"craft from {source}")
     study = Study(out or (named if inside else Path(read.name)))
@@ -50,6 +50,17 @@ def open_chain(reply: Reply, craft: str | None, out: Path | None, speed: str | N
         reply.log(f"{study.root / 'study.json'} cannot be read; every stage is checked again. Whole runs are kept.")
     reply.file("study", study.root)
     return Chain(study, read, source, reply, speed)
+
+
+def _at_speed(craft: Craft, speed: str | None) -> Craft:
+    from towtank.quantity import si
+
+    if speed is None:
+        return craft
+    value = si(speed, "m/s", "--speed")
+    if value <= 0.0:
+        raise InputError(f"--speed {speed}: the craft must move ahead. Give a speed above zero.")
+    return replace(craft, speed=value)
 
 
 @dataclass
@@ -69,6 +80,7 @@ class Chain:
         """Take the speed of the plan that the study already holds, when none was given."""
         if self.speed is None:
             self.speed = self.study.stages().get("plan", {}).get("inputs", {}).get("speed") or None
+            self.craft = _at_speed(self.craft, self.speed)
         return self
 
     def tank(self) -> Tank:
@@ -165,7 +177,7 @@ class Chain:
         from towtank.plan.files import write_plan
         from towtank.plan.standard import standard_plan
 
-        plan = standard_plan(self.craft, self.speed)
+        plan = standard_plan(self.craft)
         for note in plan.notes:
             self.reply.log(f"  note: {note}")
         write_plan(plan, self.study.root)
@@ -249,19 +261,22 @@ class Chain:
     def _trials(self) -> Sequence[Path]:
         from towtank.trials.standard import standard_trials
 
-        return self.write_trials(standard_trials(self.model()))
+        return self._write_trials(standard_trials(self.model(), self.reply.progress))
 
-    def write_trials(self, trajectories: Sequence[Trajectory]) -> Sequence[Path]:
-        """Write trials and the index of all that the folder holds."""
-        from towtank.trials.files import write_index, write_trajectory
+    def add_trial(self, trajectory: Trajectory) -> None:
+        """Write one more trial beside those of the study."""
+        standard_done = self.done("trials")
+        files = self._write_trials((trajectory,))
+        if standard_done:
+            self.study.record("trials", self.inputs("trials"), files, self.wall.get("trials", 0.0))
 
-        folder = self.study.trials
-        for item in trajectories:
-            write_trajectory(item, folder / f"{item.name}.nc")
+    def _write_trials(self, trajectories: Sequence[Trajectory]) -> Sequence[Path]:
+        from towtank.trials.files import write_index
+
         names = {item.name for item in trajectories}
-        others = [item for item in self.trajectories() if item.name not in names]
-        write_index((*trajectories, *others), folder / "index.json")
-        return [folder / "index.json", *(folder / f"{item.name}.nc" for item in trajectories)]
+        everything = (*trajectories, *(item for item in self.trajectories() if item.name not in names))
+        index = write_index(everything, self.study.trials)
+        return [index, *(self.study.trials / f"{item.name}.nc" for item in everything)]
 
     def trajectories(self) -> tuple[Trajectory, ...]:
         """The trials that the study holds."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from towtank.cli.chain import open_chain
-from towtank.cli.options import Debug, Json, Out, Speed, StudyArgument
-from towtank.cli.reply import answering
+from towtank.cli.options import Debug, Json, Out, StudyArgument
+from towtank.cli.reply import Reply, answering
 from towtank.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Kind(StrEnum):
-    """Trials on offer; the value is the word on the command line."""
+    """Trials on offer; the value is the word on the command line, the name that of the function."""
 
     STRAIGHT_RUN = "straight-run"
     TURNING_CIRCLE = "turning-circle"
@@ -31,18 +30,39 @@ class Kind(StrEnum):
     LAWNMOWER = "lawnmower"
 
 
-KindArgument = Annotated[Kind, typer.Argument(metavar="KIND", help="Which trial.", show_default=False)]
+PARAMETERS: Mapping[Kind, Mapping[str, str]] = {
+    Kind.STRAIGHT_RUN: {"speed": "speed", "lengths": "lengths"},
+    Kind.TURNING_CIRCLE: {"angle": "rudder", "speed": "speed"},
+    Kind.ZIGZAG: {"angle": "angle", "heading": "heading", "plane": "plane", "speed": "speed"},
+    Kind.SPIRAL: {"angle": "largest", "speed": "speed"},
+    Kind.PULL_OUT: {"angle": "rudder", "speed": "speed"},
+    Kind.HEADING_STEP: {"heading": "change", "speed": "speed", "lengths": "lengths"},
+    Kind.DEPTH_STEP: {"depth": "change", "speed": "speed", "lengths": "lengths"},
+    Kind.LAWNMOWER: {
+        "legs": "legs",
+        "leg_length": "leg_length",
+        "spacing": "spacing",
+        "depth": "depth",
+        "speed": "speed",
+    },
+}
+"""Option -> parameter of the trial's function."""
 
 
 def _option(metavar: str, text: str) -> Any:
     return typer.Option(metavar=metavar, help=text, show_default=False)
 
 
+KindArgument = Annotated[Kind, typer.Argument(help="Which trial.", show_default=False)]
 Angle = Annotated[str | None, _option("ANGLE", 'Fin angle, such as "10 deg" (circle, zigzag, spiral, pull-out).')]
-Heading = Annotated[str | None, _option("ANGLE", "Heading at which a zigzag turns back, or the heading step.")]
-Depth = Annotated[str | None, _option("DEPTH", 'Depth step, such as "5 m".')]
-Plane = Annotated[str | None, _option("PLANE", "horizontal or vertical, for a zigzag.")]
-Duration = Annotated[str | None, _option("TIME", 'How long, such as "120 s".')]
+Heading = Annotated[str | None, _option("ANGLE", "Heading where a zigzag turns back, or the heading step.")]
+Depth = Annotated[str | None, _option("DEPTH", 'Depth step, or depth of the mission, such as "5 m".')]
+Plane = Annotated[str | None, _option("PLANE", "horizontal or vertical (zigzag).")]
+Speed = Annotated[str | None, _option("SPEED", 'Such as "1 m/s" or "2 knot".')]
+Lengths = Annotated[float | None, _option("N", "Distance in craft lengths (straight run, steps).")]
+Legs = Annotated[int | None, _option("N", "Number of legs (lawnmower).")]
+LegLength = Annotated[str | None, _option("LENGTH", 'Such as "200 m" (lawnmower).')]
+Spacing = Annotated[str | None, _option("LENGTH", 'Between legs, such as "50 m" (lawnmower).')]
 
 
 def trial(
@@ -53,7 +73,10 @@ def trial(
     depth: Depth = None,
     plane: Plane = None,
     speed: Speed = None,
-    duration: Duration = None,
+    lengths: Lengths = None,
+    legs: Legs = None,
+    leg_length: LegLength = None,
+    spacing: Spacing = None,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -62,42 +85,40 @@ def trial(
 
     Example: towtank trial zigzag hokie --angle "20 deg" --heading "20 deg"
     """
+    given = {
+        "angle": angle, "heading": heading, "depth": depth, "plane": plane, "speed": speed,
+        "lengths": lengths, "legs": legs, "leg_length": leg_length, "spacing": spacing,
+    }  # fmt: skip
     with answering("trial", json, debug) as reply:
-        given = {
-            "angle": angle,
-            "heading": heading,
-            "depth": depth,
-            "plane": plane,
-            "speed": speed,
-            "duration": duration,
-        }
-        function = _function(kind)
-        wanted = _accepted(function, kind, {name: value for name, value in given.items() if value is not None})
+        import towtank
+
+        chosen = _parameters(kind, {name: value for name, value in given.items() if value is not None})
         chain = open_chain(reply, craft, out).keep_speed()
-        trajectory: Trajectory = function(chain.model(), **wanted)
-        chain.write_trials((trajectory,))
+        trajectory: Trajectory = getattr(towtank, kind.name.lower())(chain.model(), **chosen)
+        chain.add_trial(trajectory)
         reply.file("trial", chain.study.trials / f"{trajectory.name}.nc")
-        indices = {name: {"value": value, "unit": unit} for name, (value, unit) in trajectory.indices.items()}
-        reply.summary |= {"name": trajectory.name, "loop": trajectory.loop, "level": trajectory.level}
-        reply.summary |= {"ended": trajectory.status, "indices": indices}
-        reply.say(f"{trajectory.kind}, {trajectory.loop} loop, {trajectory.level}: {trajectory.status}")
-        for name, (value, unit) in trajectory.indices.items():
-            reply.say(f"  {name:<28} {value:12.5g} {unit}")
+        _tell(reply, trajectory)
 
 
-def _function(kind: Kind) -> Callable[..., Trajectory]:
-    import towtank
+def _tell(reply: Reply, trajectory: Trajectory) -> None:
+    indices = {name: {"value": value, "unit": unit} for name, (value, unit) in trajectory.indices.items()}
+    reply.summary |= {"name": trajectory.name, "loop": trajectory.loop, "level": trajectory.level}
+    reply.summary |= {"ended": trajectory.status, "indices": indices}
+    reply.say(f"{trajectory.kind}, {trajectory.loop} loop, {trajectory.level}: {trajectory.status}")
+    for name, (value, unit) in trajectory.indices.items():
+        reply.say(f"  {name:<28} {value:12.5g} {unit}")
 
-    function: Callable[..., Trajectory] = getattr(towtank, kind.name.lower())
-    return function
 
+def _parameters(kind: Kind, given: Mapping[str, Any]) -> dict[str, Any]:
+    """What the trial's function is called with.
 
-def _accepted(function: Callable[..., Trajectory], kind: Kind, given: dict[str, str]) -> dict[str, str]:
-    """``given``, when the trial takes all of it."""
-    takes = set(inspect.signature(function).parameters)
+    Raises
+    ------
+    InputError
+        An option that this trial does not take.
+    """
+    takes = PARAMETERS[kind]
     if foreign := [name for name in given if name not in takes]:
-        possible = ", ".join(
-            f"--{name}" for name in ("angle", "heading", "depth", "plane", "speed", "duration") if name in takes
-        )
-        raise InputError(f"{kind} takes no --{foreign[0]}. It takes: {possible or 'no options'}.")
-    return given
+        words = ", ".join(f"--{name.replace('_', '-')}" for name in takes)
+        raise InputError(f"a {kind} takes no --{foreign[0].replace('_', '-')}. Its options: {words}.")
+    return {takes[name]: value for name, value in given.items()}
