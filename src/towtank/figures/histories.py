@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.figures.paper import FIT, GREY, INK, ORIGIN, PALETTE, frame, head, legend, new_axes, note, one_level
 from towtank.figures.tracks import NO_BAND
@@ -18,11 +19,11 @@ if TYPE_CHECKING:
 
 
 def _plane(trial: Trajectory) -> tuple[Array, Array, str, str]:
-    """The angle followed and the order given [deg], with their words: the plane whose control moved more."""
-    rudder, elevator = np.degrees(trial.command[:, 0]), np.degrees(trial.command[:, 1])
-    if np.abs(elevator).max() > np.abs(rudder).max():
-        return np.degrees(trial.attitude[:, 1] - trial.attitude[0, 1]), elevator, "pitch", "elevator"
-    return np.degrees(trial.attitude[:, 2] - trial.attitude[0, 2]), rudder, "heading", "rudder"
+    """The angle followed and the order given [deg], with their words. The kind of the trial names the plane."""
+    if "vertical" in trial.kind:
+        return np.degrees(trial.attitude[:, 1]), np.degrees(trial.command[:, 1]), "pitch", "elevator"
+    heading = np.degrees(trial.attitude[:, 2] - trial.attitude[0, 2])
+    return heading, np.degrees(trial.command[:, 0]), "heading", "rudder"
 
 
 def zigzag(trial: Trajectory, ax: Axes | None = None) -> Axes:
@@ -31,7 +32,7 @@ def zigzag(trial: Trajectory, ax: Axes | None = None) -> Axes:
     ax = new_axes(ax, width=6.2, height=2.8)
     ax.plot(trial.time, angle, color=FIT, linewidth=1.4, label=followed)
     ax.plot(trial.time, order, color=ORIGIN, linewidth=1.0, label=f"{control} ordered")
-    switch = np.flatnonzero(np.sign(order[1:]) * np.sign(order[:-1]) < 0) + 1
+    switch = np.flatnonzero(np.abs(np.diff(order)) > 0.5 * np.ptp(order)) + 1 if np.ptp(order) > 0.0 else np.array([])
     for begin, end in pairwise(switch):
         sense = np.sign(angle[begin]) or 1.0
         top = begin + int(np.argmax(sense * angle[begin:end]))
@@ -53,23 +54,39 @@ def _holds(command: Array) -> list[tuple[int, int]]:
 
 
 def spiral(trial: Trajectory, ax: Axes | None = None) -> Axes:
-    """Yaw rate [deg/s] at the end of each hold against rudder [deg], in the order run.
+    """Yaw rate [deg/s] at the end of each hold against rudder [deg], both sweeps; steady turns as a line where found.
 
-    An unstable craft shows a loop between outward and back.
+    An unstable craft shows a loop between the sweeps.
     """
+    curves = trial.provenance.get("curves", {})
+    ax = new_axes(ax, width=4.4, height=3.3)
+    if "steady turns" in curves:
+        steady = curves["steady turns"]
+        ax.plot(steady["rudder"], steady["rate"], color=GREY, linewidth=1.0, label="steady turns of the model")
+    rudder, rate, down = _spiral_points(trial)
+    ax.plot(rudder[down], rate[down], "v-", color=FIT, markersize=3.5, linewidth=1.0, label="first sweep")
+    ax.plot(rudder[~down], rate[~down], "^--", color=ORIGIN, markersize=3.5, linewidth=1.0, label="back")
+    frame(ax, "rudder [deg]", "yaw rate [deg/s]")
+    ax.axvline(0.0, color="#aab3ba", linewidth=0.6, zorder=1)
+    shown = 1.15 * max(float(np.abs(rudder).max()), 1e-6)
+    ax.set_xlim(-shown, shown)
+    head(ax, f"Spiral, {trial.name}", trial.level, NO_BAND)
+    legend(ax)
+    return ax
+
+
+def _spiral_points(trial: Trajectory) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Rudder [deg], rate [deg/s] and whether a point is of the first sweep; recorded points, else the ends of holds."""
+    recorded = trial.provenance.get("curves", {}).get("spiral")
+    if recorded:
+        down = np.array([sweep == "down" for sweep in recorded["sweep"]], dtype=bool)
+        return np.asarray(recorded["rudder"], dtype=float), np.asarray(recorded["rate"], dtype=float), down
     holds = _holds(trial.command[:, 0])
     longest = max(end - begin for begin, end in holds)
     last = np.array([end - 1 for begin, end in holds if end - begin > 0.2 * longest])
     rudder, rate = np.degrees(trial.command[last, 0]), np.degrees(trial.nu[last, 5])
-    ax = new_axes(ax, width=4.2, height=3.3)
-    turn = int(np.argmin(rudder)) if abs(rudder.min()) >= abs(rudder.max()) - 1e-9 else int(np.argmax(rudder))
-    ax.plot(rudder[: turn + 1], rate[: turn + 1], "v-", color=FIT, markersize=3.5, linewidth=1.0, label="outward")
-    ax.plot(rudder[turn:], rate[turn:], "^--", color=ORIGIN, markersize=3.5, linewidth=1.0, label="back")
-    frame(ax, "rudder [deg]", "yaw rate at the end of the hold [deg/s]")
-    ax.axvline(0.0, color="#aab3ba", linewidth=0.6, zorder=1)
-    head(ax, f"Spiral, {trial.name}", trial.level, NO_BAND)
-    legend(ax)
-    return ax
+    turn = int(np.argmin(rudder)) if rudder[0] > 0.0 else int(np.argmax(rudder))
+    return rudder, rate, np.arange(len(rudder)) <= turn
 
 
 def pull_out(trials: Trajectory | Sequence[Trajectory], ax: Axes | None = None) -> Axes:
@@ -90,12 +107,12 @@ def pull_out(trials: Trajectory | Sequence[Trajectory], ax: Axes | None = None) 
 
 
 def step(trial: Trajectory, ax: Axes | None = None) -> Axes:
-    """Heading [deg] or depth [m] against time [s] with what was asked; which one follows from the set-points held."""
-    depth = "depth" in trial.kind or ("depth" in trial.setpoint and "heading" not in trial.setpoint)
+    """Heading [deg] or depth [m] against time [s] with what was asked; the kind of the trial says which."""
+    depth = "depth" in trial.kind
     answer = trial.position[:, 2] if depth else np.degrees(trial.attitude[:, 2])
     asked = trial.setpoint.get("depth" if depth else "heading")
     ax = new_axes(ax, width=4.6, height=2.7)
-    if asked is not None:
+    if asked is not None and np.isfinite(asked).any():
         ax.plot(trial.time, asked if depth else np.degrees(asked), "--", color=GREY, linewidth=1.0, label="asked")
     ax.plot(trial.time, answer, color=FIT, linewidth=1.4, label="answer")
     frame(ax, "time [s]", "depth [m]" if depth else "heading [deg]", zero=False)

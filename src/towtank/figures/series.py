@@ -61,8 +61,8 @@ def time_series(run: Run, load: str = "", derivatives: Derivatives | None = None
         ax.plot(time, modelled(derivatives, run)[0][:, column], "--", color=FIT, linewidth=1.2, label="fitted model")
     frame(ax, "time [s]", load_label(load))
     head(ax, f"{load} in {run.name}", run.level, _ensemble_words(run))
-    legend(ax, ncol=5, loc="upper right")
-    ax.margins(x=0.01, y=0.18)
+    legend(ax, ncol=3, loc="upper right")
+    ax.margins(x=0.01, y=0.3)
     return ax
 
 

@@ -39,7 +39,7 @@ def depth_profile(trials: Trajectory | Sequence[Trajectory], ax: Axes | None = N
         step = np.linalg.norm(np.diff(trial.position[:, :2], axis=0), axis=1)
         run = np.concatenate([[0.0], np.cumsum(step)])
         ax.plot(run, trial.position[:, 2], color=str(colour), linewidth=1.2, label=trial.name)
-        if "depth" in trial.setpoint:
+        if np.isfinite(trial.setpoint.get("depth", np.array(np.nan))).any():
             ax.plot(run, trial.setpoint["depth"], "--", color=GREY, linewidth=0.9, label="depth set")
     frame(ax, "distance run over ground [m]", "depth [m]", zero=False)
     low, high = ax.get_ylim()

@@ -92,6 +92,8 @@ def number(value: float | None, digits: int = 4) -> str:
 
 def with_std(value: float, std: float | None) -> tuple[str, str]:
     """Value and standard uncertainty with matching decimals: two significant digits of the uncertainty."""
+    if not math.isfinite(value):
+        return "-", "-"
     if std is None or not math.isfinite(std) or std <= 0.0:
         return number(value), "-" if std is None or not math.isfinite(std) else "0"
     place = math.floor(math.log10(std)) - 1

@@ -59,11 +59,13 @@ def _particulars(it: Craft) -> Table:
         ("Hull family", it.profile.kind, "", _mark(it, "hull.kind")),
         ("Origin aft of the nose", number(it.origin_from_nose), "m", "given"),
         ("Mass", number(it.mass.mass, 6), "kg", _mark(it, "mass.mass")),
-        ("Displaced mass", number(it.mass.displaced_mass, 6), "kg", _mark(it, "mass.net_buoyancy_percent", "mass.volume")),
+        ("Displaced mass", number(it.mass.displaced_mass, 6), "kg",
+         _mark(it, "mass.net_buoyancy_percent", "mass.volume")),
         ("CG ahead of the origin", number(it.mass.cg[0]), "m", _mark(it, "mass.cg.x")),
         ("CG to starboard", number(it.mass.cg[1]), "m", _mark(it, "mass.cg.y")),
         ("CG below the origin", number(it.mass.cg[2]), "m", _mark(it, "mass.cg.z")),
-        ("Ixx, Iyy, Izz about the origin", ", ".join(number(v) for v in np.diag(inertia)), "kg m2", _mark(it, "mass.ixx", "mass.inertia")),
+        ("Ixx, Iyy, Izz about the origin", ", ".join(number(v) for v in np.diag(inertia)), "kg m2",
+         _mark(it, "mass.ixx", "mass.inertia")),
         ("Reference speed", number(speed), "m/s", _mark(it, "conditions.speed")),
         ("Water density", number(water.density, 5), "kg/m3", _mark(it, "conditions.density")),
         ("Kinematic viscosity", number(water.kinematic_viscosity), "m2/s", _mark(it, "conditions.kinematic_viscosity")),
@@ -94,13 +96,15 @@ def _hydrostatics(it: Craft) -> Table:
 def _fins(it: Craft) -> Table:
     rows = tuple(
         (
-            str(i + 1), fin.name, number(float(np.degrees(fin.azimuth)), 4), number(fin.root_chord), number(fin.tip_chord),
+            str(i + 1), fin.name, number(float(np.degrees(fin.azimuth)), 4), number(fin.root_chord),
+            number(fin.tip_chord),
             number(fin.tip_radius), number(fin.trailing_edge), f"NACA {fin.section}",
             number(float(np.degrees(fin.max_angle)), 3), number(float(np.degrees(fin.max_rate)), 3),
         )
         for i, fin in enumerate(it.fins)
     )  # fmt: skip
-    head = ("No.", "Name", "Azimuth [deg]", "Root chord [m]", "Tip chord [m]", "Tip radius [m]", "Trailing edge aft of nose [m]",
+    head = ("No.", "Name", "Azimuth [deg]", "Root chord [m]", "Tip chord [m]", "Tip radius [m]",
+            "Trailing edge aft of nose [m]",
             "Section", "Limit [deg]", "Rate limit [deg/s]")  # fmt: skip
     marked = _mark(it, "fins", "fin")
     more = "Azimuth 0 is starboard, 90 deg the keel. A positive angle is right-handed about the outward span"

@@ -15,12 +15,12 @@ from towtank.report.study import STAGES, Study
 from towtank.symbols import LOADS, TERMS
 
 EQUATIONS = (
-    "Six degrees of freedom, lumped parameters: (M_RB - M_A) nudot + (C_RB - C_A) nu - D nu + G = tau. Derivatives are natural: "
-    "each term is a load on the body, so damping and added-mass derivatives are mostly negative."
+    "Six degrees of freedom, lumped parameters: (M_RB - M_A) nudot + (C_RB - C_A) nu - D nu + G = tau. Derivatives are "
+    "natural: each term is a load on the body, so damping and added-mass derivatives are mostly negative."
 )
 VARIANTS = {
-    "lumped": "Variant lumped: the damping terms hold the total measured load, and the added-mass matrix C_A leaves out the "
-    "products they already carry.",
+    "lumped": "Variant lumped: the damping terms hold the total measured load, and the added-mass matrix C_A leaves "
+    "out the products they already carry.",
     "split": "Variant split: the full added-mass matrix C_A stands, and the damping terms hold only the remainder.",
 }
 
@@ -60,7 +60,8 @@ def model(study: Study, book: Sketchbook) -> Section:
 def _reference(it: Derivatives) -> Table:
     at = it.reference
     rows = (
-        ("Length", number(at.length, 5), "m"), ("Speed", number(at.speed), "m/s"), ("Density", number(at.density, 5), "kg/m3"),
+        ("Length", number(at.length, 5), "m"), ("Speed", number(at.speed), "m/s"),
+        ("Density", number(at.density, 5), "kg/m3"),
         ("Point of moments, aft of the nose", number(at.origin_from_nose, 5), "m"),
     )  # fmt: skip
     more = "Primes: SNAME Bulletin 1-5, force over 0.5 rho U2 L2, moment over 0.5 rho U2 L3, and what follows from them"
@@ -100,7 +101,9 @@ def _table(it: Derivatives) -> Table:
         "model [%]",
         "Runs",
     )
-    words = "std is one standard uncertainty, all sources; fit, mesh and model form as per cent of the value; - is not stated"
+    words = (
+        "std is one standard uncertainty, all sources; fit, mesh, model form in per cent of the value; - is not stated"
+    )
     return Table("Derivatives", head, tuple(rows), stated(it.level, words))
 
 
@@ -196,7 +199,9 @@ def _classical(study: Study, it: Derivatives, found: Mapping[str, Any]) -> list[
             continue
         rows = [(name, *(number(values.get(term)) for term in terms)) for name, values in of.items()]
         rows.append(("regression", *(number(it[term]) for term in terms)))
-        more = "Small-angle formulae, one run at a time; a trend with frequency or amplitude shows what the model leaves out"
+        more = (
+            "Small-angle formulae, one run at a time; a trend with frequency or amplitude is what the model leaves out"
+        )
         note = stated(it.level, "none stated for a single run", more=more)
         head = ("Run", *(f"{term} [{TERMS[term].unit}]" for term in terms))
         blocks.append(Table(f"Classical harmonic results, {kind}", head, tuple(rows), note))

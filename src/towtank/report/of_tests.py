@@ -79,7 +79,8 @@ def appendix(study: Study, book: Sketchbook) -> Section:
         fitted = "not derived" if study.derivatives is None else "no" if why or run.exploratory else "yes"
         peak = _peaks(run)
         rows.append((
-            run.name, run.kind, number(run.speed, 3), number(peak["angle"], 3), number(peak["r"], 3), number(peak["w"], 3),
+            run.name, run.kind, number(run.speed, 3), number(peak["angle"], 3), number(peak["r"], 3),
+            number(peak["w"], 3),
             "/".join(number(float(np.degrees(d)), 3) for d in run.delta[0]) if run.delta.any() else "0",
             fitted, "; ".join(filter(None, [why, *run.flags])),
         ))  # fmt: skip
@@ -94,9 +95,8 @@ def appendix(study: Study, book: Sketchbook) -> Section:
         "fitted",
         "remarks",
     )
-    return Section("runs", "Appendix: every run", (
-        Table("Runs", head, tuple(rows), stated(_level(study.runs), "of each load: see the figures of section Forces and moments")),
-    ))  # fmt: skip
+    note = stated(_level(study.runs), "of each load: see the figures of section Forces and moments")
+    return Section("runs", "Appendix: every run", (Table("Runs", head, tuple(rows), note),))
 
 
 def _level(runs: Sequence[Run]) -> str:
@@ -132,8 +132,8 @@ def _by_kind(runs: Sequence[Run], level: str) -> Table:
             _range([p["r"] for p in peak]), _range([p["w"] for p in peak]), _range(deflection),
             str(sum(run.exploratory for run in of)), str(sum(bool(run.flags) for run in of)),
         ))  # fmt: skip
-    head = ("Kind of test", "Runs", "U [m/s]", "largest angle to flow [deg]", "largest |rate| L/U", "w L/U", "largest fin angle [deg]",
-            "exploratory", "flagged")  # fmt: skip
+    head = ("Kind of test", "Runs", "U [m/s]", "largest angle to flow [deg]", "largest |rate| L/U", "w L/U",
+            "largest fin angle [deg]", "exploratory", "flagged")  # fmt: skip
     more = "The first period of every oscillation is dropped in the analysis"
     return Table("Captive tests by kind", head, tuple(rows), stated(level, "motions are prescribed exactly", more=more))
 
@@ -185,7 +185,7 @@ def _fin_figures(study: Study, book: Sketchbook) -> list[Block]:
             if study.craft and study.craft.fins
             else []
         )
-    words = "Fin loads against the virtual angle. The derivative holds in the shaded range; beyond it the runs are recorded only."
+    words = "Fin loads against the virtual angle. The derivative holds in the shaded range; the rest is recorded only."
     return [book.panels(calls[:3], words, (2.3,), len(calls[:3]))]
 
 

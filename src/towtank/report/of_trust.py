@@ -14,14 +14,16 @@ from towtank.report.study import STAGES, Study
 from towtank.symbols import TERMS
 
 LIMITS = (
-    "The body is deeply submerged in unbounded water at rest or in a uniform current; no waves, free surface, walls or bottom.",
-    "The model has no v|r| and r|v| cross terms, no interaction of fin angle and drift beyond the straightening factors, and no "
-    "memory of the flow. It holds ahead, within the angles and rates of the captive tests.",
+    "The body is deeply submerged in unbounded water at rest or in a uniform current; no waves, free surface, walls "
+    "or bottom.",
+    "The model has no v|r| and r|v| cross terms, no interaction of fin angle and drift beyond the straightening "
+    "factors, and no memory of the flow. It holds ahead, within the angles and rates of the captive tests.",
     "The indices are those of the nominal coefficients unless a standard uncertainty is printed beside them.",
 )
 TANK_LIMITS = (
-    "The fast tank is semi-empirical: potential flow, boundary layer, cross-flow and fin lift with the constants listed in this report. "
-    "It is not CFD and not experiment. It knows no propeller, sail, strake, antenna, lee vortex or laminar separation.",
+    "The fast tank is semi-empirical: potential flow, boundary layer, cross-flow and fin lift with the constants "
+    "listed in this report. It is not CFD and not experiment. It knows no propeller, sail, strake, antenna, lee "
+    "vortex or laminar separation.",
 )
 HARMONIC = {"sway", "yaw", "heave", "pitch"}
 

@@ -178,27 +178,34 @@ def validation(study: Study, book: Sketchbook) -> Section:
     rows = study.validation.get("rows", ())
     if not rows:
         return Section("validation", "Validation", (missing("No validation table is at hand.", STAGES["validation"]),))
-    table = tuple(
-        (
-            str(r["quantity"]),
-            number(r["predicted"]),
-            number(r["measured"]),
-            f"{float(r['error_percent']):+.1f}",
-            str(r["role"]),
-            str(r["source"]),
-        )
-        for r in rows
-    )
-    predicted = [abs(float(r["error_percent"])) for r in rows if r["role"] == "predicted"]
+    predicted = [abs(float(r["error_percent"])) for r in rows if str(r["role"]).startswith("predicted")]
+    inside = [r for r in rows if "low" in r and r["low"] <= r["measured"] <= r["high"]]
     words = (
-        "The tank on a craft that was tested, not on the craft of this report. Rows marked fitted set a constant of the tank "
-        "and prove nothing; rows marked predicted do."
+        "The tank on a craft that was tested, not on the craft of this report. Rows marked fitted set a constant "
+        "of the tank and prove nothing; rows marked predicted do."
     )
     blocks: list[Block] = [Text(words)]
     if predicted:
         largest, middle = number(max(predicted), 3), number(float(np.median(predicted)), 3)
         blocks.append(Text(f"Predicted quantities: {len(predicted)}. Median error {middle} %, largest {largest} %."))
-    head = ("Quantity", "Tank", "Measured", "Error [%]", "Role", "Source")
-    note = stated("semi-empirical", "of the measurements as in their source; error is tank over measured less 100 %")
-    blocks.append(Table("Fast tank against measurements", head, table, note))
+    if inside:
+        banded = sum("low" in r for r in rows)
+        blocks.append(Text(f"{len(inside)} of {banded} measured values lie inside the tank's own 95 % band."))
+    head = ("Quantity", "Tank", "95 % band", "Measured", "Error [%]", "Role", "Source")
+    uncertainty = "band of the model-form ensemble; of the measurements as in their source; error is tank less measured"
+    note = stated(
+        str(study.validation.get("level", "semi-empirical")),
+        uncertainty,
+        more=str(study.validation.get("reference", "")),
+    )
+    blocks.append(Table("Fast tank against measurements", head, tuple(_validation_row(r) for r in rows), note))
     return Section("validation", "Validation", tuple(blocks))
+
+
+def _validation_row(row: Mapping[str, Any]) -> tuple[str, ...]:
+    band = f"{number(row['low'], 3)} to {number(row['high'], 3)}" if "low" in row and "high" in row else "-"
+    error = f"{float(row['error_percent']):+.1f}"
+    return (
+        str(row["quantity"]), number(row["predicted"]), band, number(row["measured"]), error, str(row["role"]),
+        str(row["source"]),
+    )  # fmt: skip

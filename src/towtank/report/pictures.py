@@ -29,7 +29,7 @@ STYLE: Any = {
 }
 """Held only while the report draws: text stays text, so a figure is small and can be searched."""
 
-PAGE = 10.2
+PAGE = 9.4
 """Width of the page's text [in] at the size figures are drawn."""
 
 FONTS = "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
@@ -126,5 +126,5 @@ def view(craft: Craft) -> View:
     return View(
         base64.b64encode(glb).decode("ascii"),
         base64.b64encode(still.getvalue()).decode("ascii"),
-        f"Hull and fins as modelled, hull of revolution fused with {len(craft.fins)} fins. Geometry as given; no uncertainty stated.",
+        f"Hull of revolution fused with {len(craft.fins)} fins. Geometry as given; no uncertainty stated.",
     )

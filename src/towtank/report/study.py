@@ -147,18 +147,21 @@ def _flat(things: Iterable[Any]) -> Iterator[Any]:
 
 
 def _part(thing: Any) -> str:
+    plain: tuple[tuple[type, str], ...] = (
+        (Craft, "craft"), (Plan, "plan"), (Run, "runs"), (Derivatives, "derivatives"), (Trajectory, "trajectories"),
+    )  # fmt: skip
+    for kind, name in plain:
+        if isinstance(thing, kind):
+            return name
     from towtank.model.equations import Model
     from towtank.verdict.assess import Verdict
 
-    kinds: tuple[tuple[type, str], ...] = (
-        (Craft, "craft"), (Plan, "plan"), (Run, "runs"), (Derivatives, "derivatives"), (Model, "model"),
-        (Trajectory, "trajectories"), (Verdict, "verdict"),
-    )  # fmt: skip
-    for kind, name in kinds:
-        if isinstance(thing, kind):
-            return name
-    names = ", ".join(kind.__name__ for kind, _ in kinds)
-    raise InputError(f"report: a {type(thing).__name__} cannot be shown. Give {names}, or sequences of them.")
+    if isinstance(thing, Model | Verdict):
+        return "model" if isinstance(thing, Model) else "verdict"
+    raise InputError(
+        f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, Derivatives, Model, Trajectory, "
+        "Verdict, or sequences of them."
+    )
 
 
 def document(thing: Any) -> Any:
