@@ -47,6 +47,17 @@ def settled(runs: Sequence[Run]) -> Samples:
     return Samples(joined[0], joined[1], joined[2], loads, run.astype(np.intp), period.astype(np.intp))
 
 
+def family_of(run: Run) -> str:
+    """Kind of the run; ``<kind>, mixed`` for a steady run that holds more than one of sway, heave, rates and fins.
+
+    A mixed run also sees what the model leaves out (v|r|, fins in drift), so it is not judged together with pure ones.
+    """
+    if not run.steady:
+        return run.kind
+    held = int((np.abs(run.history.nu[:, 1:]).max(axis=0) > 1e-9).sum()) + int(np.any(run.control != 0.0))
+    return f"{run.kind}, mixed" if held > 1 else run.kind
+
+
 def ensemble_size(runs: Sequence[Run]) -> int:
     """Members of the model-form ensemble, 0 when no run has one."""
     sizes = {len(run.ensemble) for run in runs if run.ensemble is not None}

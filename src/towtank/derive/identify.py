@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from towtank.derive import weights
-from towtank.derive.cycles import Samples, scatter
+from towtank.derive.cycles import Samples, family_of, scatter
 from towtank.derive.regress import Fit, Units, block_covariance, solve
 from towtank.derive.select import Choice, choose, independent
 from towtank.derive.system import System, build
@@ -84,8 +84,8 @@ def weighted(
     misfit = float(squares.sum() / (share * system.count[:, None]).sum())
     whole = _repeats(samples, system, weight, squares)
     block = system.run if whole else system.run * (int(system.period.max()) + 1) + system.period
-    kinds = sorted({run.kind for run in runs if run.steady})
-    pool = np.array([kinds.index(run.kind) if run.steady else -1 for run in runs], dtype=np.intp)
+    kinds = sorted({family_of(run) for run in runs if run.steady})
+    pool = np.array([kinds.index(family_of(run)) if run.steady else -1 for run in runs], dtype=np.intp)
     covariance, blocks = block_covariance(fit, Units(block, system.load, pool[system.run]), misfit)
     unit = "run" if whole else "run and period"
     return Solved(choice, system, share, spread, weight, fit, covariance, blocks, unit)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
+from scipy.stats import t as student
 
 from towtank.derive.system import System
 from towtank.frames import Array
@@ -81,7 +82,7 @@ def block_covariance(fit: Fit, units: Units, misfit: float) -> tuple[Array, int]
     Source     bellmccaffrey2002 (their jackknife form, CR3); cameronmiller2015, section VI.
     Departure  Steady runs are half pooled by kind: the jackknife alone is erratic where a term rests on a few of them
                (Xvr on four turns), the pool alone is wrong where their errors grow with the load (fins).
-    Valid      Blocks independent of each other. Errs on the large side with few blocks.
+    Valid      Blocks independent of each other. Few blocks: widened by Student's factor.
     """
     white = solve_triangular(fit.root, fit.weighted.T, trans="T").T
     total = _jackknife(white, fit.error, units.block, units.pool < 0, misfit)
@@ -90,7 +91,24 @@ def block_covariance(fit: Fit, units: Units, misfit: float) -> tuple[Array, int]
         at = units.pool == pool
         total += POOLED * _pooled(white[at], fit.error[at], units.block[at], units.load[at], misfit)
     back = solve_triangular(fit.root, np.eye(len(fit.scale))) / fit.scale[:, None]
-    return back @ total @ back.T, len(np.unique(units.block))
+    widen = _student(back @ white.T, units.block)
+    return back @ total @ back.T * np.outer(widen, widen), len(np.unique(units.block))
+
+
+def _student(influence: Array, block: NDArray[np.intp]) -> Array:
+    """Factor (n,) by which a standard deviation found from few blocks is widened, so that 1.96 of it hold 95 %.
+
+    influence (n, rows) of each row on each unknown. Degrees of freedom: the effective number of blocks less one, at
+    least 2.
+
+    Source     jcgm100, annex G (Student factor); cameronmiller2015, section VI (effective number of clusters).
+    """
+    _, where = np.unique(block, return_inverse=True)
+    share = np.zeros((where.max() + 1, len(influence)))
+    np.add.at(share, where, influence.T**2)
+    share /= np.maximum(share.sum(axis=0), 1e-300)
+    freedom = np.maximum(1.0 / np.maximum((share**2).sum(axis=0), 1e-12) - 1.0, 2.0)
+    return np.asarray(student.ppf(0.975, freedom) / 1.959964)
 
 
 def _jackknife(white: Array, error: Array, block: NDArray[np.intp], rows: NDArray[np.bool_], misfit: float) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from towtank.derive.cycles import family_of
 from towtank.derive.system import System
 from towtank.errors import DeriveError
 from towtank.frames import Array
@@ -34,12 +35,14 @@ def spread(system: System, runs: Sequence[Run], unknowns: Array) -> Array:
     """Standard deviation (R, 6) of each load of each run about the fit ``unknowns`` (n,).
 
     An oscillation is judged by its own residual. A steady run is a single number, so the steady runs of one kind share
-    theirs. Never below FLOOR of the load, nor 1e-3 of the load's size over all runs.
+    theirs; mixed ones (a turn with drift) are a kind of their own. Never below FLOOR of the load, nor 1e-3 of the
+    load's size over all runs.
     """
     mean_square = system.squares(unknowns) / system.count[:, None]
     power = system.power / system.count[:, None]
-    for kind in {run.kind for run in runs if run.steady}:
-        at = [i for i, run in enumerate(runs) if run.steady and run.kind == kind]
+    families = [family_of(run) for run in runs]
+    for kind in {name for name, run in zip(families, runs, strict=True) if run.steady}:
+        at = [i for i, name in enumerate(families) if name == kind]
         mean_square[at], power[at] = mean_square[at].mean(axis=0), power[at].mean(axis=0)
     smallest = np.maximum(FLOOR**2 * power, (1e-3 * load_scale(system)) ** 2)
     return np.asarray(np.sqrt(np.maximum(mean_square, smallest)))
@@ -63,7 +66,7 @@ def family(system: System, runs: Sequence[Run], weight_steady: float) -> Array:
     share = np.repeat(1.0 / system.count[:, None], 6, axis=1)
     lam = min(max(weight_steady, _END), 1.0 - _END)
     for steady, oscillatory, loads in PAIRS:
-        a = [i for i, run in enumerate(runs) if run.kind == steady]
+        a = [i for i, run in enumerate(runs) if family_of(run) == steady]
         b = [i for i, run in enumerate(runs) if run.kind == oscillatory]
         if a and b:
             for load in (LOADS.index(name) for name in loads):
