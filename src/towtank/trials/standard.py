@@ -1,0 +1,70 @@
+"""The standard set of trials, open loop and under the pilot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from towtank.errors import TrialError
+from towtank.model.equations import Model
+from towtank.progress import Progress, Silent
+from towtank.trials.circle import turning_circle
+from towtank.trials.mission import lawnmower
+from towtank.trials.pilot.design import design_pilot
+from towtank.trials.pilot.law import Pilot
+from towtank.trials.pullout import pull_out
+from towtank.trials.spiral import spiral
+from towtank.trials.steps import depth_step, heading_step
+from towtank.trials.straight import straight_run
+from towtank.trials.trajectory import Trajectory
+from towtank.trials.zigzag import zigzag
+
+Trial = Callable[[Model, Pilot | None], Trajectory]
+
+OPEN_LOOP: dict[str, Trial] = {
+    "straight run": lambda m, p: straight_run(m, pilot=p),
+    "turning circle": lambda m, p: turning_circle(m, "15 deg", pilot=p, hold_depth=p is not None),
+    "zigzag 10/10": lambda m, p: zigzag(m, "10 deg", "10 deg", pilot=p, hold_depth=p is not None),
+    "zigzag 20/20": lambda m, p: zigzag(m, "20 deg", "20 deg", pilot=p, hold_depth=p is not None),
+    "zigzag 10/5 vertical": lambda m, p: zigzag(
+        m, "10 deg", "5 deg", plane="vertical", pilot=p, hold_depth=p is not None
+    ),
+    "spiral": lambda m, p: spiral(m, "15 deg", pilot=p, hold_depth=p is not None),
+    "pull-out": lambda m, p: pull_out(m, "15 deg", pilot=p, hold_depth=p is not None),
+}
+"""Trials with the rudder or elevator open loop. The pilot holds depth and damps roll where there is one."""
+
+CLOSED_LOOP: dict[str, Trial] = {
+    "heading step": lambda m, p: heading_step(m, "30 deg", pilot=p),
+    "depth step": lambda m, p: depth_step(m, pilot=p),
+    "lawnmower": lambda m, p: lawnmower(m, pilot=p),
+}
+"""Trials under the pilot."""
+
+
+def standard_trials(model: Model, progress: Progress | None = None) -> tuple[Trajectory, ...]:
+    """All standard trials of ``model`` at its craft's speed, with one pilot designed from it.
+
+    A craft for which no pilot can be designed gets the open-loop trials only; each trajectory says so in its notes.
+    A craft without fins gets the straight run.
+
+    Raises
+    ------
+    InputError
+        The craft's speed is not positive.
+    """
+    progress = progress or Silent()
+    pilot: Pilot | None
+    try:
+        pilot = design_pilot(model)
+    except TrialError:
+        pilot = None
+    trials = dict(OPEN_LOOP) if model.craft.fins else {"straight run": OPEN_LOOP["straight run"]}
+    if pilot is not None:
+        trials |= CLOSED_LOOP
+    progress.start("trials", len(trials))
+    out = []
+    for name, trial in trials.items():
+        out.append(trial(model, pilot))
+        progress.step("trials", name)
+    progress.done("trials")
+    return tuple(out)
