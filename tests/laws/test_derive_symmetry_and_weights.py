@@ -143,3 +143,22 @@ def test_each_term_names_the_runs_it_rests_on():
     assert any(name.startswith("surge") for name in found.runs["Xudot"])
     assert all(name.startswith("roll") for name in found.runs["Kpp"])
     assert any(name.startswith("turn") and "drift" in name for name in found.runs["Xvr"])
+
+
+def test_turns_with_drift_do_not_spoil_the_pure_rotary_terms():
+    """A v|r| load is outside the model: it shows in the residual of the mixed runs and hardly in Yur or Nur."""
+    values = fourfold_coefficients(seed=3)
+
+    def cross(run):
+        v, r = run.history.nu[:, 1], run.history.nu[:, 5]
+        extra = np.zeros_like(run.loads)
+        extra[:, 1], extra[:, 5] = 5.0 * values["Yrr"] / 8.0 * v * np.abs(r), 5.0 * values["Nrr"] / 8.0 * v * np.abs(r)
+        return replace(run, loads=run.loads + extra)
+
+    # A little noise, since with exact data every misfit would be as large as any other.
+    found = derive([cross(run) for run in loaded(campaign(), values, noise=0.005, seed=1)])
+    mixed = found.quality["residuals"]["turn-0.3-drift-6"]
+    pure = found.quality["residuals"]["turn-0.3"]
+    for load, term in (("Y", "Yur"), ("N", "Nur")):
+        assert mixed[load]["rms"] > 5.0 * pure[load]["rms"]
+        assert found[term] == pytest.approx(values[term], rel=0.05)
