@@ -84,7 +84,7 @@ def derivative_bars(
 def uncertainty_shares(derivatives: Derivatives, names: Sequence[str] = (), ax: Axes | None = None) -> Axes:
     """Standard uncertainty of each term as per cent of its value, stacked by source in variance shares."""
     names = [name for name in (names or derivatives.names) if name in derivatives.names and derivatives[name] != 0.0]
-    ax = new_axes(ax, width=6.2, height=2.9)
+    ax = new_axes(ax, width=6.2, height=2.9, bottom=0.6)
     value, std = _primed(derivatives, names)
     total = np.sqrt(np.sum([bar**2 for bar in std.values()], axis=0))
     percent = 100.0 * total / np.abs(value)

@@ -96,14 +96,21 @@ def pull_out(trials: Trajectory | Sequence[Trajectory], ax: Axes | None = None) 
     for colour, trial in zip(np.resize(PALETTE, len(several)), several, strict=True):
         rate = np.degrees(trial.nu[:, 5])
         ax.plot(trial.time, rate, color=str(colour), linewidth=1.2, label=trial.name)
-        moving = np.flatnonzero(np.abs(trial.command[:, 0]) > 1e-9)
-        if len(moving) and moving[-1] + 1 < len(rate):
-            ax.axvline(trial.time[moving[-1] + 1], color=GREY, linewidth=0.7, linestyle=":")
-        note(ax, f"{rate[-1]:+.2f} deg/s left", (trial.time[-1], rate[-1]), (-2, 4), ha="right")
+        held = np.abs(trial.command[:, 0]) > 1e-9
+        for begin, end in _coasts(held):
+            ax.axvline(trial.time[begin], color=GREY, linewidth=0.7, linestyle=":")
+            note(ax, f"{rate[end - 1]:+.2f} deg/s left", (trial.time[end - 1], rate[end - 1]), (-2, 4), ha="right")
     frame(ax, "time [s]", "yaw rate [deg/s]")
     head(ax, "Pull-out", one_level([trial.level for trial in several]), NO_BAND + "; dotted: rudder amidships")
     legend(ax)
     return ax
+
+
+def _coasts(held: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Stretches [begin, end) with the rudder amidships that follow one with the rudder held over."""
+    edges = np.flatnonzero(np.diff(held)) + 1
+    bounds = [*(int(edge) for edge in edges), len(held)]
+    return [(begin, end) for begin, end in pairwise(bounds) if not held[begin]]
 
 
 def step(trial: Trajectory, ax: Axes | None = None) -> Axes:
@@ -147,7 +154,7 @@ def fin_angles(trial: Trajectory, limit: float | None = None, ax: Axes | None = 
 def fin_effort(trials: Sequence[Trajectory], ax: Axes | None = None) -> Axes:
     """Root-mean-square angle [deg] of every fin in every trial, as grouped bars."""
     several = [trial for trial in trials if trial.delta.shape[1]]
-    ax = new_axes(ax, width=6.2, height=2.7)
+    ax = new_axes(ax, width=6.2, height=3.0, bottom=0.85)
     n = max((trial.delta.shape[1] for trial in several), default=1)
     for i in range(n):
         rms = [np.degrees(np.sqrt((t.delta[:, i] ** 2).mean())) if t.delta.shape[1] > i else 0.0 for t in several]
@@ -160,9 +167,8 @@ def fin_effort(trials: Sequence[Trajectory], ax: Axes | None = None) -> Axes:
         )
     ax.set_xticks(range(len(several)))
     frame(ax, "", "rms fin angle [deg]", zero=False)
-    ax.set_xticklabels(
-        [f"{t.name}\n({t.loop})" for t in several], fontsize=5.8, rotation=20, ha="right", parse_math=False
-    )
+    names = [t.name + (" (autopilot)" if t.loop == "closed" else "") for t in several]
+    ax.set_xticklabels(names, fontsize=6.2, rotation=30, ha="right", rotation_mode="anchor", parse_math=False)
     head(ax, "Fin effort", one_level([trial.level for trial in several]), NO_BAND)
     legend(ax, ncol=n)
     return ax

@@ -36,8 +36,8 @@ def level_words(level: str) -> str:
     return LEVELS.get(level, level)
 
 
-def new_axes(ax: Axes | None, width: float = 4.6, height: float = 3.1) -> Axes:
-    """``ax`` itself, or the axes of a new figure of ``width`` by ``height`` [in] on the Agg canvas."""
+def new_axes(ax: Axes | None, width: float = 4.6, height: float = 3.1, bottom: float = 0.48) -> Axes:
+    """``ax`` itself, or the axes of a new figure of ``width`` by ``height`` [in] on the Agg canvas, ``bottom`` [in] left free."""
     if ax is not None:
         return ax
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -45,8 +45,8 @@ def new_axes(ax: Axes | None, width: float = 4.6, height: float = 3.1) -> Axes:
 
     figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
-    left, bottom, top = 0.72 / width, 0.48 / height, 0.62 / height
-    return figure.add_axes((left, bottom, 1.0 - left - 0.15 / width, 1.0 - bottom - top))
+    left, low, top = 0.72 / width, bottom / height, 0.62 / height
+    return figure.add_axes((left, low, 1.0 - left - 0.15 / width, 1.0 - low - top))
 
 
 def head(ax: Axes, title: str, level: str, uncertainty: str) -> None:
@@ -73,6 +73,8 @@ def note(ax: Axes, text: str, at: tuple[float, float], offset: tuple[float, floa
 
 def frame(ax: Axes, x: str, y: str, zero: bool = True) -> None:
     """Axis labels, a light grid, and the zero line when ``zero``."""
+    from matplotlib.ticker import MaxNLocator
+
     ax.set_xlabel(x, fontsize="small", parse_math=False)
     ax.set_ylabel(y, fontsize="small", parse_math=False)
     # Fixed places for the labels, and few ticks: measuring tick labels is half the time of drawing a figure.
@@ -82,7 +84,10 @@ def frame(ax: Axes, x: str, y: str, zero: bool = True) -> None:
         width, height = figure.get_size_inches() * (box.width, box.height)
         ax.xaxis.set_label_coords(0.5, -0.31 / height)
         ax.yaxis.set_label_coords(-0.53 / width, 0.5)
-    ax.locator_params(nbins=6)
+    for axis in (ax.xaxis, ax.yaxis):
+        locator = axis.get_major_locator()
+        if isinstance(locator, MaxNLocator):
+            locator.set_params(nbins=6)
     ax.tick_params(labelsize="x-small")
     ax.grid(True, color="#e3e7ea", linewidth=0.5)
     ax.set_axisbelow(True)

@@ -18,15 +18,23 @@ NO_BAND = "one run of the nominal model, no band"
 
 
 def plan_view(trials: Trajectory | Sequence[Trajectory], ax: Axes | None = None) -> Axes:
-    """Tracks, north [m] against east [m], equal scales; start marked."""
+    """Tracks, north [m] against east [m], equal scales; start marked, the ordered track dashed where there is one."""
     several = [trials] if isinstance(trials, Trajectory) else list(trials)
     ax = new_axes(ax, width=4.4, height=4.0)
     for colour, trial in zip(np.resize(PALETTE, len(several)), several, strict=True):
         ax.plot(trial.position[:, 1], trial.position[:, 0], color=str(colour), linewidth=1.2, label=trial.name)
         ax.plot(trial.position[0, 1], trial.position[0, 0], "o", color=str(colour), markersize=3.5)
+        ordered = trial.provenance.get("curves", {}).get("track")
+        if ordered:
+            ax.plot(ordered["east"], ordered["north"], "--", color=GREY, linewidth=0.9, label="track ordered")
     frame(ax, "east [m]", "north [m]", zero=False)
     ax.set_aspect("equal", adjustable="datalim")
-    head(ax, "Plan view", one_level([trial.level for trial in several]), NO_BAND)
+    head(
+        ax,
+        "Plan view" if len(several) > 1 else f"Plan view, {several[0].name}",
+        one_level([trial.level for trial in several]),
+        NO_BAND,
+    )
     legend(ax)
     return ax
 
@@ -70,7 +78,8 @@ def turning_circle(trial: Trajectory, ax: Axes | None = None) -> Axes:
     aside = offset @ np.array([-np.sin(course), np.cos(course)])
     ax.plot(aside, ahead, color=FIT, linewidth=1.3)
     ax.plot(0.0, 0.0, "o", color=INK, markersize=4)
-    note(ax, "rudder order", (0.0, 0.0), (4, -9))
+    port = float(aside[-1] + aside.min() + aside.max()) < 0.0
+    note(ax, "rudder order", (0.0, 0.0), (-5 if port else 5, -9), ha="right" if port else "left")
     for angle, colour in ((90.0, ORIGIN), (180.0, INK)):
         past = np.flatnonzero(turned >= np.radians(angle))
         if not len(past):
