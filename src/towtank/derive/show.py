@@ -22,6 +22,9 @@ LEVELS = {
 }
 """Level of evidence in words."""
 
+ROUND_OFF = 1e-13
+"""Primed values below this are printed as zero; those of a craft are 1e-2 to 1e-7."""
+
 
 def primes(
     d: Derivatives, length: float | None = None, about: float | None = None, speed: float | None = None
@@ -90,12 +93,13 @@ def _aligned(text: str, width: int, column: int) -> str:
 def _rows(d: Derivatives) -> list[tuple[str, ...]]:
     parts = std_parts(d)
     total = np.sqrt(np.maximum(np.diag(d.covariance), 0.0))
+    prime = [float(value) / prime_factor(d, name) for name, value in zip(d.names, d.values, strict=True)]
     return [
         (
             name,
-            pair(float(d.values[i]), float(total[i])),
+            pair(float(d.values[i]) if abs(prime[i]) > ROUND_OFF else 0.0, float(total[i])),
             TERMS[name].unit,
-            f"{float(d.values[i]) / prime_factor(d, name):.3e}",
+            f"{prime[i]:.3e}" if abs(prime[i]) > ROUND_OFF else "0",
             *(f"{float(parts[part][i]):.2g}" for part in ("fit", "mesh", "model")),
             _runs(d.runs.get(name, ())),
         )
