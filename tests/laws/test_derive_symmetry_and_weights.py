@@ -162,3 +162,23 @@ def test_turns_with_drift_do_not_spoil_the_pure_rotary_terms():
     for load, term in (("Y", "Yur"), ("N", "Nur")):
         assert mixed[load]["rms"] > 5.0 * pure[load]["rms"]
         assert found[term] == pytest.approx(values[term], rel=0.05)
+
+
+def test_one_run_of_each_kind_alone_gives_what_it_determines_and_no_more():
+    """A single run leaves terms undetermined; those it gives are right or tied up with named others."""
+    values = fourfold_coefficients(seed=6)
+    seen = {run.kind: run for run in loaded(campaign(), values)}
+    assert set(seen) == {"drift", "turn", "fins", "sway", "heave", "surge", "yaw", "pitch", "roll"}
+    for run in seen.values():
+        found = derive([run])
+        assert np.isfinite(found.values).all()
+        assert np.isfinite(found.covariance).all()
+        assert not set(found.names) & set(found.quality["not_excited"])
+    assert derive([seen["roll"]])["Kpdot"] == pytest.approx(values["Kpdot"], rel=1e-8)
+    assert derive([seen["sway"]])["Yuv"] == pytest.approx(values["Yuv"], rel=1e-8)
+
+
+def test_runs_without_load_give_zero_without_complaint():
+    found = derive(campaign())
+    assert not found.values.any()
+    assert not found.covariance.any()

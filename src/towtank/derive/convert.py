@@ -33,7 +33,8 @@ def about_point(d: Derivatives, from_nose: float | None = None, length: float | 
     -------
     Derivatives whose ``quality["moved"]`` says how each kind of term was moved and what was left behind.
 
-    Source     fossen2021 (system transformation, H^T M H); lamb1932; roddy1990 uses 4.261 m and a point 2.013 m aft of the nose.
+    Source     fossen2021 (system transformation, H^T M H); lamb1932; roddy1990 uses 4.261 m and a point 2.013 m aft
+               of the nose.
     Departure  Quadratic terms |v| v cannot be moved exactly: see ``NOTE``. ``residual`` is the root mean square error
                this leaves over |v|/U < 0.36 and r L/U < 0.6, as a share of the load.
     Valid      u > 0, where |u| v and u v are the same.
