@@ -37,7 +37,7 @@ def level_words(level: str) -> str:
 
 
 def new_axes(ax: Axes | None, width: float = 4.6, height: float = 3.1, bottom: float = 0.48) -> Axes:
-    """``ax`` itself, or the axes of a new figure of ``width`` by ``height`` [in] on the Agg canvas, ``bottom`` [in] left free."""
+    """``ax`` itself, or the axes of a new figure of ``width`` by ``height`` [in] with ``bottom`` [in] free below."""
     if ax is not None:
         return ax
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -87,7 +87,7 @@ def frame(ax: Axes, x: str, y: str, zero: bool = True) -> None:
     for axis in (ax.xaxis, ax.yaxis):
         locator = axis.get_major_locator()
         if isinstance(locator, MaxNLocator):
-            locator.set_params(nbins=6)
+            locator.set_params(nbins=5)
     ax.tick_params(labelsize="x-small")
     ax.grid(True, color="#e3e7ea", linewidth=0.5)
     ax.set_axisbelow(True)
@@ -136,12 +136,25 @@ def modelled(derivatives: Derivatives, run: Run) -> tuple[Array, Array]:
     return modelled_at(derivatives, run.history.nu, run.history.nudot, run.control, run.origin_from_nose)
 
 
+def modelled_runs(derivatives: Derivatives, runs: Sequence[Run]) -> list[Array]:
+    """Fitted loads (N, 6) of every run, evaluated in one sweep over all samples; runs of one origin."""
+    if not runs:
+        return []
+    history = [run.history for run in runs]
+    nu, nudot = np.concatenate([h.nu for h in history]), np.concatenate([h.nudot for h in history])
+    control = np.concatenate([run.control for run in runs])
+    loads = modelled_at(derivatives, nu, nudot, control, runs[0].origin_from_nose, spread=False)[0]
+    return np.split(loads, np.cumsum([len(h.time) for h in history])[:-1])
+
+
 def modelled_at(
-    derivatives: Derivatives, nu: Array, nudot: Array, control: Array, origin_from_nose: float
+    derivatives: Derivatives, nu: Array, nudot: Array, control: Array, origin_from_nose: float, spread: bool = True
 ) -> tuple[Array, Array]:
-    """As ``modelled`` for given velocities, accelerations (N, 6) and virtual controls (N, 4)."""
+    """As ``modelled`` for given velocities, accelerations (N, 6) and virtual controls (N, 4); std zero unless asked."""
     shift = np.array([origin_from_nose - derivatives.reference.origin_from_nose, 0.0, 0.0])
     nu, nudot = move_velocity(nu, shift), move_velocity(nudot, shift)
     part = np.moveaxis(move_load(np.moveaxis(columns(derivatives.names, nu, nudot, control), 2, 1), -shift), 1, 2)
-    variance = np.einsum("nlj,jk,nlk->nl", part, derivatives.covariance, part)
+    if not spread:
+        return np.asarray(part @ derivatives.values), np.zeros(part.shape[:2])
+    variance = np.einsum("nlj,nlj->nl", part @ derivatives.covariance, part)
     return np.asarray(part @ derivatives.values), np.sqrt(np.maximum(variance, 0.0))

@@ -19,6 +19,7 @@ from towtank.figures.paper import (
     legend,
     load_label,
     modelled,
+    modelled_runs,
     new_axes,
     note,
     one_level,
@@ -154,9 +155,8 @@ def residuals(runs: Sequence[Run], derivatives: Derivatives) -> Array:
     largest = np.array([np.abs(run.loads).max(axis=0) for run in runs])
     kinds = np.array([run.kind for run in runs])
     out = np.full(largest.shape, np.nan)
-    for i, run in enumerate(runs):
-        used = run.settled
-        rms = np.sqrt(((run.loads - modelled(derivatives, run)[0])[used] ** 2).mean(axis=0))
+    for i, (run, fit) in enumerate(zip(runs, modelled_runs(derivatives, runs), strict=True)):
+        rms = np.sqrt(((run.loads - fit)[run.settled] ** 2).mean(axis=0))
         size = largest[i] / np.array([1.0, 1.0, 1.0, run.length, run.length, run.length])
         kept = size > 0.02 * size.max()
         out[i, kept] = 100.0 * rms[kept] / largest[kinds == run.kind].max(axis=0)[kept]

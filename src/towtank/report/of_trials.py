@@ -65,9 +65,15 @@ def _figures(study: Study, book: Sketchbook) -> list[Block]:
 
 
 def _caption(trial: Trajectory) -> str:
-    ended = "" if trial.status == "done" else f" Ended early: {trial.status}."
+    ended = "" if trial.status == "done" else f" {_sentence(trial.status)}"
     loop = "Autopilot" if trial.loop == "closed" else "Open loop"
     return f"{trial.kind.capitalize()} {trial.name}. {loop}, nominal model.{ended}"
+
+
+def _sentence(status: str) -> str:
+    """Why a trial ended, as a sentence that says that it did."""
+    words = status if status.startswith("ended early") else f"ended early: {status}"
+    return words.rstrip(".") + "."
 
 
 def _list(it: Sequence[Trajectory]) -> Table:
@@ -116,4 +122,4 @@ def headline(it: Sequence[Trajectory]) -> list[tuple[str, str, str]]:
 
 def remarks(it: Sequence[Trajectory]) -> list[Block]:
     """One paragraph for each trial that ended early."""
-    return [Text(f"Trial {t.name} ended early: {t.status}.", "bad") for t in it if t.status != "done"]
+    return [Text(f"Trial {t.name}: {_sentence(t.status)}", "bad") for t in it if t.status != "done"]

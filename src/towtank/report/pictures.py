@@ -107,6 +107,8 @@ def view(craft: Craft) -> View:
     """
     import matplotlib
     import trimesh
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
     from towtank.craft.solid import write_glb
     from towtank.figures.shape import shaded
@@ -119,10 +121,11 @@ def view(craft: Craft) -> View:
     # glTF has y up, z forward, x to port.
     vertices = surface.vertices[:, [2, 0, 1]] * (1.0, -1.0, -1.0)
     with matplotlib.rc_context(STYLE):
-        figure = shaded(vertices, surface.faces).get_figure(root=True)
-        assert figure is not None
+        figure = Figure(figsize=(8.0, 3.5))
+        FigureCanvasAgg(figure)
+        shaded(vertices, surface.faces, figure.add_axes((0.02, 0.02, 0.96, 0.82)))
         still = io.BytesIO()
-        figure.savefig(still, format="png", dpi=130)
+        figure.savefig(still, format="png", dpi=120, transparent=True)
     return View(
         base64.b64encode(glb).decode("ascii"),
         base64.b64encode(still.getvalue()).decode("ascii"),

@@ -2,11 +2,12 @@
   "use strict";
   var box = document.getElementById("view"), data = document.getElementById("craft-glb");
   if (!box || !data || typeof TowtankThree === "undefined") return;
+  if (!document.createElement("canvas").getContext("webgl2")) return; // no WebGL: the still picture stays
   var T = TowtankThree, renderer;
   try {
     renderer = new T.WebGLRenderer({ antialias: true, alpha: true });
   } catch (error) {
-    return; // no WebGL: the still picture stays
+    return;
   }
   var text = atob(data.textContent.trim()), bytes = new Uint8Array(text.length);
   for (var i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
@@ -29,7 +30,7 @@
     scene.add(sun);
     var camera = new T.PerspectiveCamera(28, 16 / 7, size.length() * 0.01, size.length() * 20);
     // glTF axes: y up, z forward, x to port. The eye is above the starboard bow.
-    camera.position.set(-0.62, 0.4, 0.62).normalize().multiplyScalar(size.length() * 1.0);
+    camera.position.set(-0.62, 0.4, 0.62).normalize().multiplyScalar(size.length() * 1.2);
     var controls = new T.OrbitControls(camera, renderer.domElement);
     controls.enableZoom = true;
     function draw() {
