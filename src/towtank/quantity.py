@@ -77,6 +77,8 @@ def _parse(text: str, unit: str, where: str) -> float:
     if quantity.unitless and unit:
         return _bare(float(quantity.magnitude), unit, where)
     try:
+        if unit == "rad/s" and "hertz" in str(quantity.units):  # pint takes a hertz for one radian per second
+            return float(2.0 * math.pi * quantity.to("Hz").magnitude)
         return float(quantity.to(unit or "dimensionless").magnitude)
     except (pint.DimensionalityError, TypeError, ValueError):
         raise InputError(

@@ -65,3 +65,10 @@ def test_a_wrong_dimension_is_refused(value: str, unit: str):
 def test_what_is_no_number_is_refused_with_its_place(value: object):
     with pytest.raises(InputError, match=r"hull\.length"):
         si(value, "m", "hull.length")  # type: ignore[arg-type]
+
+
+def test_a_hertz_is_a_turn_in_a_second() -> None:
+    assert si("0.5 Hz", "rad/s") == pytest.approx(math.pi)
+    assert si("500 mHz", "rad/s") == pytest.approx(math.pi)
+    assert si("30 deg/s", "rad/s") == pytest.approx(math.pi / 6)
+    assert si("60 rpm", "rad/s") == pytest.approx(2 * math.pi)

@@ -223,11 +223,8 @@ def _fins(given: Any, craft: Craft, where: str) -> tuple[float, ...]:
 
 
 def _number(value: Any, unit: str, where: str) -> float:
-    """SI number of a value with its unit; cycles per second are turned into rad/s."""
+    """SI number of a value with its unit."""
     try:
-        if unit == "rad/s" and isinstance(value, str) and value.strip().lower().endswith("hz"):
-            # pint takes a hertz for one radian per second.
-            return 2.0 * math.pi * si(value, "Hz", where)
         return si(value, unit, where)
     except InputError as error:
         raise PlanError(str(error)) from None
