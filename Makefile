@@ -43,7 +43,7 @@ lint: $(VENV)/.tools
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/pytest -m "not validate" -n $(JOBS)
+	$(BIN)/pytest -m "not validate" -n $(JOBS) --dist loadfile
 
 validate: $(VENV)/.tools
 	$(BIN)/pytest -m validate
