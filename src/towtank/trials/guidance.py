@@ -11,13 +11,14 @@ class LineOfSight:
     """Follow the straight leg from ``start`` to ``end``, (north, east) [m] each.
 
     lookahead [m] : distance ahead at which the craft aims for the leg.   gain [1/m] : of the integral that takes out
-    the drift of a cross current.
+    the drift that is left.   crab [rad] : angle between course and heading that a known cross current asks for.
     """
 
     start: tuple[float, float]
     end: tuple[float, float]
     lookahead: float
     gain: float
+    crab: float = 0.0
 
     @property
     def course(self) -> float:
@@ -37,14 +38,15 @@ class LineOfSight:
     def heading(self, north: float, east: float, integral: float) -> tuple[float, float]:
         """Heading wanted [rad] and the rate of the integral [m/s per unit speed] at a position.
 
-        psi = course - atan((y + integral) / lookahead),  rate = gain lookahead^2 y / (lookahead^2 + (y + integral)^2).
+        psi = course - crab - atan((y + integral) / lookahead)
+        rate = gain lookahead^2 y / (lookahead^2 + (y + integral)^2)
 
         Source     fossen2021, ch. 12, integral line-of-sight guidance.
-        Departure  The integral is kept in metres of offset, so that it can be read as the drift it balances; its rate
-                   is per metre travelled at unit speed and is scaled by the mission.
+        Departure  The crab angle stands beside the integral. The integral is kept in metres of offset, so that it can
+                   be read as the drift it balances; the mission scales its gain with the speed.
         Valid      Currents below the speed of the craft.
         """
         _, y = self.along_and_across(north, east)
         aim = y + integral
         square = self.lookahead * self.lookahead
-        return self.course - atan(aim / self.lookahead), self.gain * square * y / (square + aim * aim)
+        return self.course - self.crab - atan(aim / self.lookahead), self.gain * square * y / (square + aim * aim)

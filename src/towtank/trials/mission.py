@@ -27,6 +27,8 @@ LOOKAHEAD = 2.5
 gain; not below 3 lengths. The guidance must be slower than the heading loop it stands on."""
 DRIFT = 3.0
 """Multiple of the lookahead in which the guidance takes out the drift of a cross current."""
+WIDEST = 12.0
+"""Turning diameter, in lengths, beyond which the pattern is not widened any more."""
 RUDDER_SHARE = 0.6
 """Share of the rudder range that the turns between legs are planned with."""
 PATIENCE = 3.0
@@ -46,6 +48,8 @@ def lawnmower(
 ) -> Trajectory:
     """Long legs north and south, joined by short legs to the east, under line-of-sight guidance and the pilot.
 
+    The craft knows the current, as one with a bottom-tracking log does, and heads into it from the start of a leg.
+
     Parameters
     ----------
     legs : number of long legs.   leg_length, spacing : [m] or text; when not given, 25 and 10 craft lengths or 3
@@ -62,7 +66,7 @@ def lawnmower(
     """
     length = model.craft.length
     s = setting(model, speed, pilot)
-    diameter = min(turning_diameter(model, s, RUDDER_SHARE * fin_limit(model)), 50.0 * length)
+    diameter = min(turning_diameter(model, s.speed, RUDDER_SHARE * fin_limit(model)), WIDEST * length)
     long_ = max(25.0 * length, 3.0 * diameter) if leg_length is None else si(leg_length, "m", "leg_length")
     short = max(10.0 * length, 1.5 * diameter) if spacing is None else si(spacing, "m", "spacing")
     if legs < 1 or long_ < 8.0 * length or short < 4.0 * length:
@@ -117,7 +121,8 @@ def _leg(s: Setting, name: str, line: LineOfSight, depth: float, early: float, c
     """One straight leg; it ends ``early`` [m] before its corner, so that the turn ends on the next one."""
     against = math.hypot(current[0], current[1])
     expected = line.length / max(s.speed - against, 0.2 * s.speed)
-    scaled = replace(line, gain=line.gain * s.speed)
+    across = current[1] * math.cos(line.course) - current[0] * math.sin(line.course)
+    scaled = replace(line, gain=line.gain * s.speed, crab=math.asin(across / s.speed))
     helm = replace(s.helm, guidance=scaled, depth=depth)
     return Leg(name, helm, PATIENCE * expected, _passed(line, early), required=True)
 

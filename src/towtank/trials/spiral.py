@@ -18,9 +18,9 @@ from towtank.trials.start import angle, fin_limit, setting
 from towtank.trials.steady import SteadyTurns, steady_turns
 from towtank.trials.trajectory import Trajectory
 
-STEPS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.1, 0.05, 0.0)
+STEPS = (1.0, 0.7, 0.45, 0.3, 0.2, 0.1, 0.0)
 """Rudder steps as shares of the largest angle, closer towards amidships where a loop would be."""
-FIRST, EACH = 10.0, 6.0
+FIRST, EACH = 10.0, 5.0
 """Lengths travelled on the first step and on each of the others before the rate is read."""
 
 
@@ -38,11 +38,12 @@ def spiral(
     ----------
     largest : rudder; text with a unit or radians.   speed : approach speed.   hold_depth : see ``turning_circle``.
 
-    Indices: loop width [deg of rudder] and height [deg/s, between the branches at zero rudder], both zero for a stable
-    craft; slope of yaw rate against rudder at zero [1/s]; ``residual_change``: the largest change of the rate over the
-    last quarter of a step, in per cent of the largest rate, which says how steady the steps were; width, height and
-    slope of the algebraic curve. ``provenance["curves"]`` holds "spiral" (rudder [deg], rate [deg/s], sweep) and
-    "steady turns" (rudder, rate, drift [deg], speed [m/s]).
+    Indices: loop width [deg of rudder, between the angles at which the rate changes sign] and height [deg/s, between
+    the branches at zero rudder], both zero for a stable craft but for the lag of the steps; slope of yaw rate against
+    rudder at zero [1/s]; ``residual_change``: the largest change of the rate over the last quarter of a step, in per
+    cent of the largest rate, which says how steady the steps were; width, height and slope of the algebraic curve.
+    ``provenance["curves"]`` holds "spiral" (rudder [deg], rate [deg/s], sweep) and "steady turns" (rudder, rate,
+    drift [deg], speed [m/s]).
 
     Source     ittc75040201, direct (Dieudonne) spiral.
     Valid      The measured width is known to within one rudder step near its edges.
@@ -53,7 +54,7 @@ def spiral(
     rudders = limit * np.array([*STEPS, *(-x for x in reversed(STEPS[:-1]))])
     sweep = np.concatenate([rudders, rudders[::-1][1:]])
     # Turning slows the craft down, so a length takes longer than at the approach speed.
-    turns = steady_turns(model, s, 0.5 / s.convective)
+    turns = steady_turns(model, s.speed, 0.5 / s.convective)
     reached = np.abs(turns.rudder) <= 1.05 * abs(limit)
     convective = s.convective * s.speed / max(float(turns.speed[reached].min()), 0.3 * s.speed)
     flight = free_run(model, s.state, _legs(base, sweep, convective), thrust=s.thrust, interval=s.convective / 8.0)
@@ -108,17 +109,24 @@ def _readings(flight: Flight, steps: int) -> tuple[Array, float]:
 
 def _loop(rudders: Array, down: Array, up: Array) -> dict[str, tuple[float, str]]:
     """Width, height and slope from the two sweeps over the same rudder angles."""
-    gap = np.abs(down - up)
-    open_ = gap > 0.1 * np.abs(down).max()
     middle = int(np.argmin(np.abs(rudders)))
-    width = float(np.ptp(rudders[open_])) if open_.any() else 0.0
     mean = 0.5 * (down + up)
     slope = float((mean[middle + 1] - mean[middle - 1]) / (rudders[middle + 1] - rudders[middle - 1]))
+    width = abs(_turnover(rudders, down) - _turnover(rudders, up))
     return {
         "loop_width": (float(np.degrees(width)), "deg"),
-        "loop_height": (float(np.degrees(gap[middle])) if open_[middle] else 0.0, "deg/s"),
+        "loop_height": (float(np.degrees(abs(down[middle] - up[middle]))), "deg/s"),
         "slope": (slope, "1/s"),
     }
+
+
+def _turnover(rudders: Array, rate: Array) -> float:
+    """Rudder [rad] at which the yaw rate of one sweep changes sign, by straight lines between the steps."""
+    i = np.flatnonzero(np.diff(np.sign(rate)) != 0)
+    if not len(i):
+        return float("nan")
+    k = int(i[0])
+    return float(rudders[k] - rate[k] * (rudders[k + 1] - rudders[k]) / (rate[k + 1] - rate[k]))
 
 
 def _algebraic(turns: SteadyTurns) -> dict[str, tuple[float, str]]:

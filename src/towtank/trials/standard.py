@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from towtank.errors import TrialError
 from towtank.model.equations import Model
@@ -13,6 +14,7 @@ from towtank.trials.pilot.design import design_pilot
 from towtank.trials.pilot.law import Pilot
 from towtank.trials.pullout import pull_out
 from towtank.trials.spiral import spiral
+from towtank.trials.start import ballasted, level_trim
 from towtank.trials.steps import depth_step, heading_step
 from towtank.trials.straight import straight_run
 from towtank.trials.trajectory import Trajectory
@@ -41,11 +43,16 @@ CLOSED_LOOP: dict[str, Trial] = {
 """Trials under the pilot."""
 
 
+AS_LOADED = ("straight run",)
+"""Trials run as the craft is loaded even when it cannot be flown level."""
+
+
 def standard_trials(model: Model, progress: Progress | None = None) -> tuple[Trajectory, ...]:
     """All standard trials of ``model`` at its craft's speed, with one pilot designed from it.
 
-    A craft for which no pilot can be designed gets the open-loop trials only; each trajectory says so in its notes.
-    A craft without fins gets the straight run.
+    A craft whose weight residual cannot be carried level at this speed is ballasted to neutral for its trials, as a
+    crew would do; the straight run is made as loaded, so that the sinking is seen. A craft for which no pilot can be
+    designed gets the open-loop trials only. A craft without fins gets the straight run. The trajectories' notes say so.
 
     Raises
     ------
@@ -53,18 +60,28 @@ def standard_trials(model: Model, progress: Progress | None = None) -> tuple[Tra
         The craft's speed is not positive.
     """
     progress = progress or Silent()
+    trim = level_trim(model, model.craft.speed)
+    neutral = model if trim.holds or not model.craft.fins else ballasted(model)
+    notes = [] if neutral is model else [f"Ballasted to neutral for this trial: {trim.why}."]
     pilot: Pilot | None
     try:
-        pilot = design_pilot(model)
-    except TrialError:
-        pilot = None
+        pilot = design_pilot(neutral)
+    except TrialError as error:
+        pilot, notes = None, [*notes, f"No pilot: {error}"]
     trials = dict(OPEN_LOOP) if model.craft.fins else {"straight run": OPEN_LOOP["straight run"]}
     if pilot is not None:
         trials |= CLOSED_LOOP
     progress.start("trials", len(trials))
     out = []
     for name, trial in trials.items():
-        out.append(trial(model, pilot))
+        loaded = name in AS_LOADED
+        made = trial(model if loaded else neutral, pilot)
+        out.append(made if loaded else _noted(made, notes))
         progress.step("trials", name)
     progress.done("trials")
     return tuple(out)
+
+
+def _noted(trial: Trajectory, notes: list[str]) -> Trajectory:
+    merged = [*trial.provenance.get("notes", []), *notes]
+    return replace(trial, provenance={**trial.provenance, "notes": merged})

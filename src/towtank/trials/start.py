@@ -69,6 +69,31 @@ def level_trim(model: Model, speed: float) -> Trim:
     return Trim(speed, float(theta), float(de), float(u), float(w))
 
 
+def slowest_level_speed(model: Model, fastest: float = 5.0) -> float | None:
+    """Slowest speed [m/s], to 1 %, from which on the craft can carry its weight residual level.
+
+    None if it cannot even at ``fastest`` times its own speed.
+    """
+    speeds = model.craft.speed * np.geomspace(0.3, fastest, 25)
+    able = [level_trim(model, float(speed)).holds for speed in speeds]
+    if not able[-1]:
+        return None
+    first = len(able) - 1 - next((i for i, ok in enumerate(reversed(able)) if not ok), len(able))
+    if first < 0:
+        return float(speeds[0])
+    low, high = float(speeds[first]), float(speeds[first + 1])
+    while high / low > 1.01:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if level_trim(model, middle).holds else (middle, high)
+    return high
+
+
+def ballasted(model: Model) -> Model:
+    """``model`` with the displaced mass made equal to the mass: the craft trimmed to neutral for its trials."""
+    mass = replace(model.craft.mass, displaced_mass=model.craft.mass.mass)
+    return replace(model, craft=replace(model.craft, mass=mass))
+
+
 @dataclass(frozen=True)
 class Setting:
     """What every trial starts from: speed [m/s], trim, state (12 + n_fins + 3,), helm at rest in trim, thrust [N].

@@ -10,25 +10,19 @@ from scipy.optimize import root
 from towtank.errors import TrialError
 from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.trials.pilot.allocation import allocation
-from towtank.trials.start import Setting
 
 
 @dataclass(frozen=True)
 class SteadyTurns:
-    """Steady turns at constant depth, by rising turning rate; N points.
+    """Steady turns in the horizontal plane, by rising yaw rate; N points.
 
-    rate (N,) : turning rate psidot [rad/s].   rudder, elevator (N,) [rad].   speed (N,) [m/s].   drift, pitch, roll
-    (N,) [rad].
+    rate (N,) : yaw rate [rad/s].   rudder, drift (N,) [rad].   speed (N,) [m/s].
     """
 
     rate: Array
     rudder: Array
-    elevator: Array
-    speed: Array
     drift: Array
-    pitch: Array
-    roll: Array
+    speed: Array
 
     def rudder_span(self) -> float:
         """Rudder [rad] between the folds of the curve: the width of the spiral's loop; 0 for a single-valued curve.
@@ -56,15 +50,14 @@ class SteadyTurns:
         return float(np.abs(roots).max()) if len(roots) > 1 else 0.0
 
 
-def steady_turns(model: Model, setting: Setting, largest: float, points: int = 25) -> SteadyTurns:
-    """Steady turns from -``largest`` to +``largest`` [rad/s] at constant depth and the thrust of ``setting``.
+def steady_turns(model: Model, speed: float, largest: float, points: int = 25) -> SteadyTurns:
+    """Steady turns from -``largest`` to +``largest`` [rad/s] at the thrust of ``speed`` [m/s].
 
-    The turning rate is the parameter of the continuation: at a given rate there is one rudder angle even where the
-    S-curve of an unstable craft folds back. Roll is damped by the pilot's aileron if the setting has one. Points where
-    no steady turn is found end the curve.
+    The yaw rate is the parameter of the continuation: at a given rate there is one rudder angle even where the S-curve
+    of an unstable craft folds back. A branch ends where no steady turn is found.
 
-    Source     Zero accelerations in ``Model.rates`` with p = -psidot sin(theta), q = psidot cos(theta) sin(phi),
-               r = psidot cos(theta) cos(phi); solved by scipy's hybrid method.
+    Source     Zero accelerations u, v, r in ``Model.rates`` with w, p, q, phi and theta zero; scipy's hybrid method.
+    Departure  A free-running craft pitches and rolls in a turn; this curve leaves that out, as the classical one does.
     Valid      Fins are not limited, so that the curve is smooth; compare the rudder with the limit.
 
     Raises
@@ -72,51 +65,45 @@ def steady_turns(model: Model, setting: Setting, largest: float, points: int = 2
     TrialError
         No steady turn at all.
     """
-    up = _branch(model, setting, np.linspace(0.0, largest, points))
-    down = _branch(model, setting, np.linspace(0.0, -largest, points))
+    up = _branch(model, speed, np.linspace(0.0, largest, points))
+    down = _branch(model, speed, np.linspace(0.0, -largest, points))
     rows = np.array([*reversed(down), *up[1:]])
     if len(rows) < 5:
         raise TrialError(
-            f"steady turns of {model.craft.name}: none found near straight flight at {setting.speed:g} m/s. "
-            + (setting.trim.why or "The craft may have no rudder (Nuudr, Yuudr zero).")
+            f"steady turns of {model.craft.name}: none found near straight flight at {speed:g} m/s. The craft has no "
+            "rudder to turn with: look at Nuudr and Yuudr."
         )
-    rate, u, v, w, phi, theta, de, dr = rows.T
-    return SteadyTurns(rate, dr, de, np.sqrt(u * u + v * v + w * w), np.arctan2(-v, u), theta, phi)
+    rate, u, v, dr = rows.T
+    return SteadyTurns(rate, dr, np.arctan2(-v, u), np.hypot(u, v))
 
 
-def turning_diameter(model: Model, setting: Setting, rudder: float) -> float:
+def turning_diameter(model: Model, speed: float, rudder: float) -> float:
     """Diameter [m] of the tightest steady turn that takes no more than ``rudder`` [rad]; infinite if there is none."""
-    turns = steady_turns(model, setting, 0.5 / setting.convective, points=13)
+    turns = steady_turns(model, speed, 0.5 * speed / model.craft.length, points=13)
     able = (np.abs(turns.rudder) <= rudder) & (np.abs(turns.rate) > 0.0)
     return float((2.0 * turns.speed[able] / np.abs(turns.rate[able])).min()) if able.any() else float("inf")
 
 
-def _branch(model: Model, setting: Setting, rates: Array) -> list[tuple[float, ...]]:
-    s, U, length = setting, setting.speed, model.craft.length
-    mixed = allocation(model.craft).fins
-    pilot = s.helm.pilot
-    scale = np.array([U, U, U, 1.0, 1.0, 1.0, 1.0])
-    size = np.array([U, U, U, U / length, U / length, U / length, U]) * U / length
+def _branch(model: Model, U: float, rates: Array) -> list[tuple[float, ...]]:
+    length, thrust = model.craft.length, model.thrust(U)
+    mixing = model.craft.mixing[:, 0]
+    size = np.array([U, U, U / length]) * U / length
 
     def residual(unknown: Array, rate: float) -> Array:
-        u, v, w, phi, theta, de, dr = (float(x) for x in unknown * scale)
-        p, q, r = -rate * np.sin(theta), rate * np.cos(theta) * np.sin(phi), rate * np.cos(theta) * np.cos(phi)
-        state = [0.0, 0.0, 0.0, phi, theta, 0.0, u, v, w, float(p), float(q), float(r)]
-        da = 0.0 if pilot is None else pilot.aileron(state)
-        fins = mixed((dr, de, da))
-        rates = model.rates([*state, *fins], fins, s.thrust)
-        return np.array([*rates[6:12], rates[2] * U / length]) / size
+        u, v, dr = unknown[0] * U, unknown[1] * U, unknown[2]
+        fins = [float(m * dr) for m in mixing]
+        out = model.rates([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(u), float(v), 0.0, 0.0, 0.0, rate, *fins], fins, thrust)
+        return np.array([out[6], out[7], out[11]]) / size
 
-    guess = np.array([s.trim.u, 0.0, s.trim.w, 0.0, s.trim.pitch, s.trim.elevator, 0.0]) / scale
-    out: list[tuple[float, ...]] = []
-    before = guess
+    guess = before = np.array([1.0, 0.0, 0.0])
+    rows: list[tuple[float, ...]] = []
     for rate in rates:
         found = root(residual, guess, args=(float(rate),), tol=1e-9)
         if np.abs(found.fun).max() > 1e-6 or found.x[0] <= 0.05:
             break
-        out.append((float(rate), *(found.x * scale)))
+        rows.append((float(rate), found.x[0] * U, found.x[1] * U, found.x[2]))
         # The next guess lies on the line through the last two solutions.
-        guess, before = (2.0 * found.x - before, found.x) if len(out) > 1 else (found.x, found.x)
+        guess, before = (2.0 * found.x - before, found.x) if len(rows) > 1 else (found.x, found.x)
         # hybr steps in proportion to each unknown: round-off in place of a zero would leave it without a step.
         guess = np.where(np.abs(guess) < 1e-10, 0.0, guess)
-    return out
+    return rows

@@ -22,7 +22,7 @@ def straight_run(
     model: Model,
     speed: Quantity | None = None,
     *,
-    disturbance: Quantity = "0.5 deg",
+    disturbance: Quantity = "0.1 deg",
     lengths: float = LENGTHS,
     hold_depth: bool = False,
     pilot: Pilot | None = None,

@@ -1,0 +1,152 @@
+"""Straight-line stability of both planes with the uncertainty of the derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towtank.errors import InputError
+from towtank.frames import Array
+from towtank.model.equations import Model
+from towtank.model.values import to_variant
+
+SAMPLES = 2000
+SEED = 20
+LINEAR = ("Yuv", "Nuv", "Yur", "Nur", "Zuw", "Muw", "Zuq", "Muq")
+
+
+@dataclass(frozen=True)
+class PlaneCriteria:
+    """Stability of one plane in straight flight with fixed controls.
+
+    eigenvalues [1/s], least damped first: (v, r), or (w, q, theta) with the righting moment.   slopes : "origin" or
+    "wide", whichever the eigenvalues and the probability rest on.   index, index_std : stability index G and its
+    standard uncertainty on these slopes.   index_wide : on the wide fit.   index_range : 5 and 95 % quantiles.
+    stable : of the best estimate.   probability : share of the sampled derivatives that are stable.
+    doubling : time to double [s] of the least damped mode; negative is a time to halve.
+    """
+
+    plane: str
+    slopes: str
+    eigenvalues: tuple[complex, ...]
+    index: float
+    index_std: float
+    index_range: tuple[float, float]
+    index_wide: float
+    stable: bool
+    probability: float
+    doubling: float
+
+
+def samples(model: Model, count: int = SAMPLES, slopes: str = "origin", seed: int = SEED) -> dict[str, Array]:
+    """Derivatives drawn from their uncertainty: term -> (count + 1,), the first being the best estimate.
+
+    The covariance of the wide fit is used. Slopes at the origin keep its correlations and take their own standard
+    uncertainty. The variant is "lumped".
+
+    Raises
+    ------
+    InputError
+        Origin slopes asked of derivatives that hold none.
+    """
+    d = to_variant(model.derivatives, "lumped")
+    if slopes == "origin" and not d.origin:
+        raise InputError(f"the derivatives of {d.craft} hold no slopes at the origin. Use slopes='wide'.")
+    drawn = np.random.default_rng(seed).multivariate_normal(
+        np.zeros(len(d.names)), d.covariance, size=count, method="eigh", check_valid="ignore"
+    )
+    drawn = np.vstack([np.zeros(len(d.names)), drawn])
+    out = {name: d.values[i] + drawn[:, i] for i, name in enumerate(d.names)}
+    if slopes == "origin":
+        for name, value in d.origin.items():
+            spread = drawn[:, d.names.index(name)] if name in d.names else np.zeros(count + 1)
+            size = float(np.std(spread[1:])) if count > 1 else 0.0
+            unit = spread / size if size > 0.0 else np.zeros(count + 1)
+            out[name] = value + unit * d.origin_std.get(name, size)
+    return out
+
+
+def horizontal_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Array:
+    """A (n, 2, 2) of d(v, r)/dt for ``v`` = term -> (n,), at ``speed`` [m/s].
+
+    Source     fossen2021, ch. 6: linear sway-yaw equations; damping in the lumped variant.
+    Valid      Small motions, fins at rest.
+    """
+    b = model.constants.body
+    get = _getter(v)
+    M = _matrix([[b.m - get("Yvdot"), b.m * b.xG - get("Yrdot")], [b.m * b.xG - get("Nvdot"), b.Izz - get("Nrdot")]])
+    D = speed * _matrix([[get("Yuv"), get("Yur") - b.m], [get("Nuv"), get("Nur") - b.m * b.xG]])
+    return np.asarray(np.linalg.solve(M, D))
+
+
+def vertical_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Array:
+    """A (n, 3, 3) of d(w, q, theta)/dt for ``v`` = term -> (n,), at ``speed`` [m/s].
+
+    Source     fossen2021, ch. 8: linear heave-pitch equations with the righting moment.
+    Valid      Small motions about level flight, fins at rest.
+    """
+    b = model.constants.body
+    get = _getter(v)
+    M = _matrix([[b.m - get("Zwdot"), -b.m * b.xG - get("Zqdot")], [-b.m * b.xG - get("Mwdot"), b.Iyy - get("Mqdot")]])
+    D = speed * _matrix([[get("Zuw"), get("Zuq") + b.m], [get("Muw"), get("Muq") - b.m * b.xG]])
+    stiffness = b.g * (b.m * b.zG - b.b * b.zB)
+    n = len(M)
+    A = np.zeros((n, 3, 3))
+    A[:, :2, :2] = np.linalg.solve(M, D)
+    A[:, :2, 2] = np.linalg.solve(M, np.tile(np.array([[0.0], [-stiffness]]), (n, 1, 1)))[:, :, 0]
+    A[:, 2, 1] = 1.0
+    return A
+
+
+def index(model: Model, v: Mapping[str, Array], plane: str) -> Array:
+    """Stability index G (n,) of ``plane`` ("horizontal" or "vertical") for ``v`` = term -> (n,).
+
+    Source     roddy1990; THEORY section 7. As ``model.linear.stability_indices``, for many sets at once.
+    Valid      Ahead; the limit of high speed in the vertical plane.
+    """
+    b, get = model.constants.body, _getter(v)
+    if plane == "horizontal":
+        above, below = get("Nuv") * (get("Yur") - b.m), get("Yuv") * (get("Nur") - b.xG * b.m)
+    else:
+        above, below = get("Muw") * (get("Zuq") + b.m), get("Zuw") * (get("Muq") - b.xG * b.m)
+    return np.asarray(1.0 - np.divide(above, below, out=np.full_like(above, np.nan), where=below != 0.0))
+
+
+def plane_criteria(model: Model, plane: str, speed: float) -> PlaneCriteria:
+    """Criteria of one plane at ``speed`` [m/s]: on slopes at the origin where the derivatives hold them."""
+    slopes = "origin" if model.derivatives.origin else "wide"
+    drawn = samples(model, slopes=slopes)
+    A = (horizontal_matrix if plane == "horizontal" else vertical_matrix)(model, drawn, speed)
+    values: NDArray[np.complex128] = np.asarray(np.linalg.eigvals(A), dtype=complex)
+    growth = values.real.max(axis=1)
+    G = index(model, drawn, plane)
+    wide = {name: value[:1] for name, value in samples(model, 1, "wide").items()}
+    best = values[0][np.lexsort((values[0].imag, -values[0].real))]
+    spread = G[1:][np.isfinite(G[1:])]
+    low, high = np.quantile(spread, [0.05, 0.95]) if len(spread) else (np.nan, np.nan)
+    return PlaneCriteria(
+        plane=plane,
+        slopes=slopes,
+        eigenvalues=tuple(complex(s) for s in best),
+        index=float(G[0]),
+        # The ratio has heavy tails; the width of the middle 68 % says more than the second moment.
+        index_std=float(np.diff(np.quantile(spread, [0.1587, 0.8413]))[0] / 2.0) if len(spread) else float("nan"),
+        index_range=(float(low), float(high)),
+        index_wide=float(index(model, wide, plane)[0]),
+        stable=bool(growth[0] < 0.0),
+        probability=float((growth[1:] < 0.0).mean()),
+        doubling=float(np.log(2.0) / growth[0]) if growth[0] != 0.0 else float("inf"),
+    )
+
+
+def _getter(v: Mapping[str, Array]):  # type: ignore[no-untyped-def]
+    size = len(next(iter(v.values())))
+    return lambda name: v.get(name, np.zeros(size))
+
+
+def _matrix(rows: list[list[Array]]) -> Array:
+    """(n, k, k) from a nested list of (n,)."""
+    return np.moveaxis(np.array(rows), -1, 0)
