@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,19 +13,18 @@ from towtank.cli.app import app
 
 runner = CliRunner()
 CRAFT = "hokie"
-PATIENCE = 300.0
-"""Seconds for what takes about ten on a quiet machine."""
 STAGES = ("craft", "plan", "tow", "derive", "trials", "verdict", "report")
 
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, str]:
-    """Folder, JSON document and remarks of a first run, as a user would make it."""
+    """Folder, JSON document and remarks of a first run in an empty folder."""
     folder = tmp_path_factory.mktemp("fresh")
-    words = [sys.executable, "-m", "towtank", "run", CRAFT, "--json"]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert done.returncode == 0, done.stderr
-    return folder / CRAFT, json.loads(done.stdout), done.stderr
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        result = runner.invoke(app, ["run", CRAFT, "--json"])
+    assert result.exit_code == 0, result.stderr
+    return folder / CRAFT, json.loads(result.stdout), result.stderr
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from towtank.tank.run import Run
     from towtank.tank.tank import Tank
     from towtank.trials.trajectory import Trajectory
-    from towtank.verdict.assess import Verdict
+    from towtank.verdict.table import Verdict
 
 STAGES = ("craft", "plan", "tow", "derive", "trials", "verdict", "report")
 

@@ -10,6 +10,7 @@ import typer
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
 from towtank.cli.reply import answering
+from towtank.errors import InputError
 
 About = Annotated[
     str | None,
@@ -41,6 +42,8 @@ def derive(
 
         point = None if about is None else si(about, "m", "--about")
         reference = None if length is None else si(length, "m", "--length")
+        if reference is not None and reference <= 0.0:
+            raise InputError(f"--length {length}: primes are divided by powers of it. Give a length above zero.")
         chain = open_chain(reply, craft, out).keep_speed()
         chain.derive()
         derived = chain.derivatives()

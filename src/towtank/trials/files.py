@@ -12,6 +12,7 @@ import numpy as np
 
 from towtank.artefact import Variable, read_netcdf, series, write_json, write_netcdf
 from towtank.errors import ArtefactError
+from towtank.provenance import provenance
 from towtank.trials.trajectory import Trajectory
 
 SCHEMA = "towtank/trajectory/1"
@@ -120,5 +121,6 @@ def write_index(
             }
             for t in trajectories
         ],
+        "provenance": provenance(),
     }  # fmt: skip
     return write_json(folder / "index.json", document)
