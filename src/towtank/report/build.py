@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -72,7 +74,8 @@ def page(study: Study, title: str = "") -> str:
     import jinja2
 
     book = Sketchbook()
-    sections = [section(study, book) for section in SECTIONS]
+    with _collector_at_rest():
+        sections = [section(study, book) for section in SECTIONS]
     moving = any(isinstance(block, View) for section in sections for block in section.blocks)
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
@@ -87,6 +90,18 @@ def page(study: Study, title: str = "") -> str:
         three=_text("vendor/three.min.js") if moving else "",
         viewer=_text("viewer.js"),
     )
+
+
+@contextmanager
+def _collector_at_rest() -> Iterator[None]:
+    """Stop the cyclic collector: passes over the million small objects of the figures take a tenth of the time."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 def _title(study: Study) -> str:

@@ -107,15 +107,17 @@ def _indices(it: Sequence[Trajectory], index: Mapping[str, Any]) -> Table:
     return Table("Indices", ("Trial", "Index", "Value", "std", "Unit"), tuple(rows), stated(level, words, more=more))
 
 
-def headline(it: Sequence[Trajectory]) -> list[tuple[str, str, str]]:
-    """A few indices for the summary: (words, value, unit)."""
+def headline(it: Sequence[Trajectory], index: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """A few indices for the summary: (words, value, std, unit)."""
     wanted = (("circle", "tactical_diameter"), ("circle", "advance"), ("zigzag", "first_overshoot"))
+    recorded = {str(entry.get("name")): entry.get("indices", {}) for entry in index.get("trials", ())}
     rows = []
     for kind, key in wanted:
         for trial in _of(it, kind)[:1]:
             for name, (value, unit) in trial.indices.items():
                 if name.replace(" ", "_").startswith(key):
-                    rows.append((f"{name.replace('_', ' ').capitalize()}, {trial.name}", number(float(value)), unit))
+                    pair = with_std(float(value), recorded.get(trial.name, {}).get(name, {}).get("std"))
+                    rows.append((f"{name.replace('_', ' ').capitalize()}, {trial.name}", *pair, unit))
                     break
     return rows
 

@@ -129,8 +129,8 @@ def provenance(study: Study, book: Sketchbook) -> Section:
         found.append(("derivatives", study.derivatives.provenance))
     if study.trajectories:
         found.append(("trials", study.trajectories[0].provenance))
-    if study.verdict.get("provenance"):
-        found.append(("verdict", study.verdict["provenance"]))
+    if study.verdict:
+        found.append(("verdict", study.verdict.provenance))
     rows = []
     for stage, block in found:
         for key in ("program", "version", "date", "platform", "tank"):

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from towtank.errors import TowtankError
 from towtank.figures import poles
 from towtank.figures.paper import level_words
-from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated
+from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated, with_std
 from towtank.report.of_trials import headline, remarks
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import STAGES, Study
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from towtank.model.equations import Model
+    from towtank.verdict.table import Verdict
+
 PLANES = ("horizontal", "vertical")
+SYMBOL = {"horizontal": "G_h", "vertical": "G_v"}
 SPEEDS = (0.5, 1.5, 11)
 """Range of the pole map as shares of the reference speed, and number of speeds."""
 
@@ -30,10 +37,10 @@ def summary(study: Study, book: Sketchbook) -> Section:
         blocks += _judgement(study.verdict)
     else:
         blocks.append(missing("There is no verdict.", STAGES["verdict"]))
-    rows = [*_headline(study), *headline(study.trajectories)]
+    rows = [*_headline(study), *headline(study.trajectories, study.index)]
     if rows:
-        table = Table("Main numbers", ("Quantity", "Value", "Unit"), tuple(rows),
-                      stated(" + ".join(study.levels), "with each number in its own section"))  # fmt: skip
+        table = Table("Main numbers", ("Quantity", "Value", "std", "Unit"), tuple(rows),
+                      stated(" + ".join(study.levels), "std is one standard uncertainty, - where not stated here"))  # fmt: skip
         blocks.append(table)
     blocks += remarks(study.trajectories)
     blocks += [Text(f"{stage}: {message}", "bad") for stage, message in study.problems]
@@ -43,134 +50,135 @@ def summary(study: Study, book: Sketchbook) -> Section:
     return Section("summary", "Summary", tuple(blocks))
 
 
-def _judgement(verdict: Mapping[str, Any]) -> list[Block]:
-    words = verdict.get("words") or ()
-    lines = [words] if isinstance(words, str) else list(words)
-    planes = [verdict[plane] for plane in PLANES if isinstance(verdict.get(plane), Mapping)]
-    tone = "good" if planes and all(plane.get("stable") for plane in planes) else "bad"
-    return [Text(str(line), tone) for line in lines]
+def _judgement(it: Verdict) -> list[Block]:
+    """The words of the verdict, paragraph by paragraph; the first carries the colour."""
+    tone = "good" if it.horizontal.stable and it.vertical.stable and all(r.met for r in it.requirements) else "bad"
+    lines = [line.strip() for line in it.words.split("\n\n") if line.strip()]
+    return [Text(line, tone if i == 0 else "plain") for i, line in enumerate(lines)]
 
 
-def _headline(study: Study) -> list[tuple[str, str, str]]:
-    rows: list[tuple[str, str, str]] = []
+def _headline(study: Study) -> list[tuple[str, str, str, str]]:
+    """Main numbers: words, value, standard uncertainty, unit."""
+    rows: list[tuple[str, str, str, str]] = []
     if study.craft:
-        rows += [("Length", number(study.craft.length), "m"), ("Largest diameter", number(study.craft.diameter), "m"),
-                 ("Mass", number(study.craft.mass.mass, 6), "kg")]  # fmt: skip
+        rows += [("Length", number(study.craft.length), "-", "m"),
+                 ("Largest diameter", number(study.craft.diameter), "-", "m"),
+                 ("Mass", number(study.craft.mass.mass, 6), "-", "kg")]  # fmt: skip
     if study.runs:
-        rows.append(("Captive tests", str(len(study.runs)), ""))
-    for plane in PLANES:
-        it = study.verdict.get(plane)
-        if isinstance(it, Mapping):
-            rows += [(f"{words}, {plane} plane", value, "") for words, value in _plane_numbers(it)]
-    if reversal := study.verdict.get("elevator_reversal_speed"):
-        value = reversal.get("value") if isinstance(reversal, Mapping) else reversal
-        rows.append(("Elevator reversal speed", number(value), "m/s"))
+        rows.append(("Captive tests", str(len(study.runs)), "-", ""))
+    if it := study.verdict:
+        for plane in (it.horizontal, it.vertical):
+            rows.append((f"Stability index {SYMBOL[plane.plane]}", *with_std(plane.index, plane.index_std), ""))
+            rows.append((f"Probability of being stable, {plane.plane} plane", number(plane.probability, 3), "-", ""))
+        if it.elevator_reversal_speed is not None:
+            rows.append(("Elevator reversal speed", number(it.elevator_reversal_speed, 3), "-", "m/s"))
     return rows
-
-
-def _plane_numbers(it: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Stability index and probability of a plane; an index may be a number or a mapping of names to numbers."""
-    rows = []
-    for key in it:
-        if key == "G" or key.startswith(("G_", "P_")):
-            value = it[key]
-            if isinstance(value, Mapping):
-                rows += [(f"{key}, {name.replace('_', ' ')}", number(v, 3)) for name, v in value.items() if _real(v)]
-            elif _real(value):
-                rows.append((key, number(float(value), 3)))
-    return rows
-
-
-def _real(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def verdict(study: Study, book: Sketchbook) -> Section:
-    """Criteria, eigenvalues, requirements, and the pole map against speed."""
+    """Words, criteria, requirements, open against closed loop, and the poles against speed."""
     blocks: list[Block] = []
-    if study.verdict:
-        blocks += _judgement(study.verdict)
-        blocks.append(_planes(study.verdict))
-        blocks += _requirements(study.verdict)
+    if it := study.verdict:
+        blocks += [*_judgement(it), _planes(it), _requirements(it)]
+        if it.comparison:
+            blocks.append(_comparison(it))
+        if it.effectiveness:
+            blocks.append(_effectiveness(it))
     else:
         blocks.append(missing("There is no verdict.", STAGES["verdict"]))
     blocks += _pole_maps(study, book)
     return Section("verdict", "Stability verdict", tuple(blocks))
 
 
-def _planes(it: Mapping[str, Any]) -> Table:
-    rows = []
-    for plane in PLANES:
-        of = it.get(plane)
-        if not isinstance(of, Mapping):
-            continue
-        rows.append((plane, "eigenvalues [1/s]", ", ".join(_complex(value) for value in of.get("eigenvalues", ()))))
-        if "stable" in of:
-            rows.append((plane, "stable", "yes" if of["stable"] else "no"))
-        rows += [(plane, words, value) for words, value in _plane_numbers(of)]
-    reversal = it.get("elevator_reversal_speed")
-    if _real(reversal):
-        rows.append(("vertical", "elevator reversal speed [m/s]", number(reversal)))
-    words = "P is the share of samples of the derivatives' uncertainty that are stable"
-    more = f"At {number(it.get('speed'))} m/s. G above zero: straight-line stability with fins held"
-    return Table(
-        "Stability", ("Plane", "Quantity", "Value"), tuple(rows), stated(str(it.get("level", "")), words, more=more)
-    )
+def _planes(it: Verdict) -> Table:
+    rows: list[tuple[str, str, str]] = []
+    for of in (it.horizontal, it.vertical):
+        symbol = SYMBOL[of.plane]
+        mean, std = with_std(of.index, of.index_std)
+        low, high = of.index_range
+        rows += [
+            (of.plane, "stable, fins held", "yes" if of.stable else "no"),
+            (of.plane, "probability of being stable", number(of.probability, 3)),
+            (of.plane, f"{symbol}, {_SLOPES[of.slopes]}", f"{mean} ± {std}"),
+            (of.plane, f"{symbol}, 5 to 95 %", f"{number(low, 3)} to {number(high, 3)}"),
+            (of.plane, f"{symbol}, wide fit", number(of.index_wide, 3)),
+            (of.plane, "eigenvalues [1/s]", ", ".join(_complex(value) for value in of.eigenvalues)),
+            (of.plane, "least damped motion doubles in (negative: halves in) [s]", number(of.doubling, 3)),
+        ]
+    if it.elevator_reversal_speed is not None:
+        rows.append(("vertical", "elevator reversal speed [m/s]", number(it.elevator_reversal_speed, 3)))
+    words = "std and range from samples of the derivatives' covariance; the probability is the share of stable samples"
+    more = f"At {number(it.speed)} m/s. G above zero: straight-line stability with fins held"
+    return Table("Stability", ("Plane", "Quantity", "Value"), tuple(rows), stated(it.level, words, more=more))
 
 
-def _complex(value: Any) -> str:
-    if isinstance(value, Mapping):
-        value = complex(value.get("real", 0.0), value.get("imag", 0.0))
-    elif isinstance(value, list | tuple):
-        value = complex(*value[:2])
-    value = complex(value)
+def _complex(value: complex) -> str:
     return number(value.real, 3) if abs(value.imag) < 1e-9 else f"{number(value.real, 3)} {value.imag:+.3g}i"
 
 
-def _requirements(it: Mapping[str, Any]) -> list[Block]:
-    found = [entry for entry in it.get("requirements", ()) if isinstance(entry, Mapping)]
-    if not found:
-        return []
-    head = tuple(dict.fromkeys(key for entry in found for key in entry))
-    rows = tuple(tuple(_entry(entry.get(key)) for key in head) for entry in found)
-    note = stated(str(it.get("level", "")), "as stated in the column, where there is one")
-    return [Table("Requirements", tuple(key.replace("_", " ") for key in head), rows, note)]
+def _requirements(it: Verdict) -> Table:
+    rows = tuple(
+        (r.name, number(r.value), number(r.limit), r.unit, "met" if r.met else "not met", r.note)
+        for r in it.requirements
+    )
+    head = ("Requirement", "Value", "Limit", "Unit", "Result", "Remark")
+    return Table("Requirements", head, rows, stated(it.level, "in the remark, where it was found"))
 
 
-def _entry(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if _real(value):
-        return number(float(value))
-    if isinstance(value, list | tuple):
-        return ", ".join(_entry(item) for item in value)
-    return "-" if value is None else str(value)
+def _comparison(it: Verdict) -> Table:
+    rows = tuple((c.quantity, number(c.open), number(c.closed), c.unit, c.note) for c in it.comparison)
+    head = ("Quantity", "Open loop", "Autopilot", "Unit", "Trials")
+    return Table("Open against closed loop", head, rows, stated(it.level, "none stated; nominal model"))
+
+
+def _effectiveness(it: Verdict) -> Table:
+    rows = tuple((name.replace("_", " "), number(value), unit) for name, (value, unit) in it.effectiveness.items())
+    return Table(
+        "What the fins do", ("Quantity", "Value", "Unit"), rows, stated(it.level, "none stated; nominal model")
+    )
 
 
 def _pole_maps(study: Study, book: Sketchbook) -> list[Block]:
-    """Eigenvalues of both planes over speed from the model in hand; none without one."""
+    """Eigenvalues of both planes over speed, and G over the uncertainty, from the model in hand; none without one."""
     if study.model is None:
         return [missing("No pole map: there is no model.", "It needs the craft and its derivatives.")]
+    slopes = "origin" if study.model.derivatives.origin else "wide"
     try:
-        sweeps = [_sweep(study, plane) for plane in PLANES]
+        sweeps = [_sweep(study.model, plane, slopes) for plane in PLANES]
+        calls = [*(partial(poles.pole_map, sweep) for sweep in sweeps), partial(poles.real_parts, sweeps)]
     except (TowtankError, np.linalg.LinAlgError) as error:
         return [Text(f"The poles against speed could not be found: {error}", "bad")]
-    calls = [*(partial(poles.pole_map, sweep) for sweep in sweeps), partial(poles.real_parts, sweeps)]
-    return [book.panels(calls, "Eigenvalues of the linear model about straight flight, fins held.", (2.4,), 3)]
+    words = f"Eigenvalues of the linear model about straight flight, fins held, on the {_SLOPES[slopes]}."
+    blocks: list[Block] = [book.panels(calls, words, (2.4,), 3)]
+    if study.model.derivatives.covariance.any():
+        drawn = [partial(_index_figure, study.model, plane, slopes) for plane in PLANES]
+        words = "Stability indices over the uncertainty of the derivatives, fit and model form together."
+        blocks.append(book.panels(drawn, words, (1.9,), 2))
+    return blocks
 
 
-def _sweep(study: Study, plane: str) -> poles.PoleSweep:
+_SLOPES = {"origin": "slopes at the origin", "wide": "wide fit"}
+
+
+def _sweep(model: Model, plane: str, slopes: str) -> poles.PoleSweep:
     from towtank.model import linear
 
-    assert study.model is not None
     low, high, count = SPEEDS
-    speeds = study.model.craft.speed * np.linspace(low, high, count)
+    speeds = model.craft.speed * np.linspace(low, high, count)
+    states = ("v", "r") if plane == "horizontal" else ("w", "q", "theta")
     linearise = linear.horizontal if plane == "horizontal" else linear.vertical
-    eigenvalues = np.array([np.linalg.eigvals(linearise(study.model, float(speed)).A) for speed in speeds])
-    of = study.verdict.get(plane)
-    indices = dict(_plane_numbers(of)) if isinstance(of, Mapping) else {}
-    named = {words: float(value) for words, value in indices.items() if words.startswith("G") and value != "-"}
-    return poles.PoleSweep(plane, study.model.derivatives.level, speeds, eigenvalues, named)
+    eigenvalues = np.array([np.linalg.eigvals(linearise(model, float(s), slopes, states).A) for s in speeds])
+    kinds = ("wide", "origin") if slopes == "origin" else ("wide",)
+    found = {kind: getattr(linear.stability_indices(model, kind), plane) for kind in kinds}
+    indices = {f"{SYMBOL[plane]}, {_SLOPES[kind]}": float(value) for kind, value in found.items()}
+    return poles.PoleSweep(plane, model.derivatives.level, speeds, eigenvalues, indices)
+
+
+def _index_figure(model: Model, plane: str, slopes: str, ax: Axes | None = None) -> Axes:
+    from towtank.verdict import criteria
+
+    values = criteria.index(model, criteria.samples(model, slopes=slopes), plane)
+    return poles.stability_index(SYMBOL[plane], values[1:], float(values[0]), model.derivatives.level, ax)
 
 
 def validation(study: Study, book: Sketchbook) -> Section:

@@ -24,6 +24,8 @@ STYLE: Any = {
     "font.size": 9.0,
     "axes.linewidth": 0.7,
     "axes.labelpad": 2.0,
+    "xtick.bottom": False,
+    "ytick.left": False,
     "figure.dpi": 72.0,
     "savefig.dpi": 150.0,
 }

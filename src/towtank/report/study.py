@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -19,6 +19,7 @@ from towtank.trials.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from towtank.model.equations import Model
+    from towtank.verdict.table import Verdict
 
 STAGES = {
     "craft": "Pass the Craft, or run `towtank new`.",
@@ -37,7 +38,7 @@ STAGES = {
 class Study:
     """Everything a report may show; any part may be absent.
 
-    verdict, index, grid, validation : documents as in verdict.json, trials/index.json, grid.json, validation.json.
+    index, grid, validation : documents as in trials/index.json, grid.json, validation.json.
     problems : (stage, message) of files that exist and cannot be read.
     remarks : what the reader must know about where a part came from.
     """
@@ -48,7 +49,7 @@ class Study:
     derivatives: Derivatives | None = None
     model: Model | None = None
     trajectories: tuple[Trajectory, ...] = ()
-    verdict: Mapping[str, Any] = field(default_factory=dict)
+    verdict: Verdict | None = None
     index: Mapping[str, Any] = field(default_factory=dict)
     grid: Mapping[str, Any] = field(default_factory=dict)
     validation: Mapping[str, Any] = field(default_factory=dict)
@@ -61,7 +62,7 @@ class Study:
         found = [run.level for run in self.runs]
         found += [self.derivatives.level] if self.derivatives else []
         found += [trial.level for trial in self.trajectories]
-        found += [str(self.verdict["level"])] if self.verdict.get("level") else []
+        found += [self.verdict.level] if self.verdict else []
         return tuple(dict.fromkeys(found))
 
     @property
@@ -93,8 +94,6 @@ def gather(things: Iterable[Any]) -> Study:
             )
         else:
             held[name] = thing
-    if "verdict" in held:
-        held["verdict"] = document(held["verdict"])
     study = Study(**{**held, "runs": tuple(held["runs"]), "trajectories": tuple(held["trajectories"])})
     return completed(study)
 
@@ -154,7 +153,7 @@ def _part(thing: Any) -> str:
         if isinstance(thing, kind):
             return name
     from towtank.model.equations import Model
-    from towtank.verdict.assess import Verdict
+    from towtank.verdict.table import Verdict
 
     if isinstance(thing, Model | Verdict):
         return "model" if isinstance(thing, Model) else "verdict"
@@ -162,17 +161,6 @@ def _part(thing: Any) -> str:
         f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, Derivatives, Model, Trajectory, "
         "Verdict, or sequences of them."
     )
-
-
-def document(thing: Any) -> Any:
-    """A noun as plain mappings and lists, keys as in its dataclass."""
-    if is_dataclass(thing) and not isinstance(thing, type):
-        return {item.name: document(getattr(thing, item.name)) for item in fields(thing)}
-    if isinstance(thing, Mapping):
-        return {str(key): document(value) for key, value in thing.items()}
-    if isinstance(thing, list | tuple):
-        return [document(value) for value in thing]
-    return thing
 
 
 def shipped_validation() -> Mapping[str, Any]:
@@ -206,6 +194,7 @@ def read_study(folder: Path | str) -> Study:
     from towtank.craft.library import read_craft
     from towtank.derive.files import read_derivatives
     from towtank.plan.files import read_plan
+    from towtank.verdict.files import read_verdict
 
     files = {name: root / name for name in ("craft.toml", "plan.toml", "runs", "derivatives.json", "trials")}
     craft = attempt("craft", files["craft.toml"], lambda: read_craft(files["craft.toml"]))
@@ -218,9 +207,7 @@ def read_study(folder: Path | str) -> Study:
             "derivatives", files["derivatives.json"], lambda: read_derivatives(files["derivatives.json"])
         ),
         trajectories=attempt("trials", files["trials"], lambda: _trajectories(files["trials"]), ()),
-        verdict=attempt(
-            "verdict", root / "verdict.json", lambda: read_json(root / "verdict.json", "towtank/verdict/1"), {}
-        ),
+        verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
         index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
         grid=attempt("grid", root / "grid.json", lambda: read_json(root / "grid.json", "towtank/grid/1"), {}),
     )
