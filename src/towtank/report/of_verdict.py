@@ -39,8 +39,8 @@ def summary(study: Study, book: Sketchbook) -> Section:
         blocks.append(missing("There is no verdict.", STAGES["verdict"]))
     rows = [*_headline(study), *headline(study.trajectories, study.index)]
     if rows:
-        table = Table("Main numbers", ("Quantity", "Value", "std", "Unit"), tuple(rows),
-                      stated(" + ".join(study.levels), "std is one standard uncertainty, - where not stated here"))  # fmt: skip
+        note = stated(" + ".join(study.levels), "std is one standard uncertainty, - where it is not stated here")
+        table = Table("Main numbers", ("Quantity", "Value", "std", "Unit"), tuple(rows), note)
         blocks.append(table)
     blocks += remarks(study.trajectories)
     blocks += [Text(f"{stage}: {message}", "bad") for stage, message in study.problems]
