@@ -41,7 +41,7 @@ def zigzag(trial: Trajectory, ax: Axes | None = None) -> Axes:
         note(ax, f"{over:.1f}°", (trial.time[top], angle[top]), (0, 5 if sense > 0 else -11), ha="center")
     frame(ax, "time [s]", "angle [deg]")
     ax.margins(y=0.18)
-    head(ax, f"Zigzag, {trial.name}: overshoot beyond the heading at the switch", trial.level, NO_BAND)
+    head(ax, f"Zigzag, {trial.name}", trial.level, NO_BAND + "; marked: swing beyond the switch")
     legend(ax, ncol=2, loc="upper right")
     return ax
 

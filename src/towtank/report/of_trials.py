@@ -16,13 +16,25 @@ from towtank.trials.trajectory import Trajectory
 def trials(study: Study, book: Sketchbook) -> Section:
     """Figures of every kind of trial, then the indices of all of them."""
     title = "Simulated manoeuvres"
-    it = study.trajectories
+    it = _ordered(study.trajectories)
     if not it:
         return Section("trials", title, (missing("No trial was given.", STAGES["trials"]),))
     blocks: list[Block] = [_list(it)]
-    blocks += _figures(study, book)
-    blocks.append(_indices(it, study.index))
+    blocks += _figures(study, it, book)
+    common = _common(it)
+    blocks.append(_indices(it, study.index, common))
+    if common:
+        blocks.append(_common_table(it, common))
     return Section("trials", title, tuple(blocks))
+
+
+ORDER = ("straight", "circle", "zigzag, h", "zigzag", "spiral", "pull", "heading", "depth", "lawnmower")
+"""Words of the kinds in the order of the page: open loop first."""
+
+
+def _ordered(it: Sequence[Trajectory]) -> list[Trajectory]:
+    """Trials in the order of the page; within a kind as given."""
+    return sorted(it, key=lambda t: next((i for i, word in enumerate(ORDER) if word in t.kind), len(ORDER)))
 
 
 def _of(it: Sequence[Trajectory], *words: str) -> list[Trajectory]:
@@ -31,8 +43,7 @@ def _of(it: Sequence[Trajectory], *words: str) -> list[Trajectory]:
     return [t for t in it if any(word in t.kind.replace("-", "").replace(" ", "").replace("_", "") for word in plain)]
 
 
-def _figures(study: Study, book: Sketchbook) -> list[Block]:
-    it = study.trajectories
+def _figures(study: Study, it: Sequence[Trajectory], book: Sketchbook) -> list[Block]:
     blocks: list[Block] = []
     for trial in _of(it, "circle")[:2]:
         blocks.append(book.draw(tracks.turning_circle, trial, caption=_caption(trial)))
@@ -86,13 +97,15 @@ def _list(it: Sequence[Trajectory]) -> Table:
     return Table("Trials", head, rows, stated(level, "nominal model; uncertainty of the indices in their own table"))
 
 
-def _indices(it: Sequence[Trajectory], index: Mapping[str, Any]) -> Table:
+def _indices(it: Sequence[Trajectory], index: Mapping[str, Any], common: Sequence[str]) -> Table:
     recorded = {str(entry.get("name")): entry.get("indices", {}) for entry in index.get("trials", ())}
     rows: list[tuple[str, ...]] = []
     some = False
     for trial in it:
         known = recorded.get(trial.name, {})
         for name, (value, unit) in trial.indices.items():
+            if name in common:
+                continue
             std = known.get(name, {}).get("std") if isinstance(known.get(name), Mapping) else None
             some = some or std is not None
             mean, spread = with_std(float(value), None if std is None else float(std))
@@ -105,6 +118,19 @@ def _indices(it: Sequence[Trajectory], index: Mapping[str, Any]) -> Table:
     )
     more = "Angles in the unit stated; heading positive to starboard, depth downwards"
     return Table("Indices", ("Trial", "Index", "Value", "std", "Unit"), tuple(rows), stated(level, words, more=more))
+
+
+def _common(it: Sequence[Trajectory]) -> list[str]:
+    """Indices that every trial has; none for a single trial."""
+    return [name for name in it[0].indices if all(name in t.indices for t in it)] if len(it) > 1 else []
+
+
+def _common_table(it: Sequence[Trajectory], names: Sequence[str]) -> Table:
+    rows = tuple((t.name, *(number(float(t.indices[name][0]), 3) for name in names)) for t in it)
+    units = {name: it[0].indices[name][1] for name in names}
+    head = ("Trial", *(name.replace("_", " ") + (f" [{units[name]}]" if units[name] else "") for name in names))
+    level = " + ".join(dict.fromkeys(t.level for t in it))
+    return Table("Numbers that every trial has", head, rows, stated(level, "not computed for these numbers"))
 
 
 def headline(it: Sequence[Trajectory], index: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
