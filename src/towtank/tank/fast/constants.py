@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from towtank.frames import Array
 
@@ -58,6 +57,8 @@ NOMINAL: dict[str, float] = {item.name: item.value for item in CONSTANTS}
 @functools.lru_cache(maxsize=4)
 def sample(members: int, seed: int = 0) -> Mapping[str, Array]:
     """Constants (members + 1,): the nominal set first, then a scrambled Sobol sample of the distributions."""
+    from scipy.stats import norm, qmc  # a second of import that settings() must not cost
+
     values = {item.name: np.full(members + 1, item.value) for item in CONSTANTS}
     if members == 0:
         return MappingProxyType(values)
