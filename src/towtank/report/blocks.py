@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from towtank.figures.paper import level_words
 
 AXES = "Axes: SNAME, x forward, y starboard, z down; loads act on the body"
-_NUMBER = re.compile(r"^[-+\u2212]?[\d.]+(e[-+]?\d+)?( \S{1,8})?( ?± ?[\d.e+-]+)?( %)?$")
+_NUMBER = re.compile(r"^[-+\u2212]?[\d.]+(e[-+]?\d+)?( to [-+]?[\d.e+-]+)?( \S{1,8})?( ?± ?[\d.e+-]+)?( %)?$")
 
 
 @dataclass(frozen=True)
