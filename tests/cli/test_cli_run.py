@@ -66,7 +66,7 @@ def test_the_first_run_has_open_and_closed_loop_trials(first: tuple[Path, dict, 
 
 def test_asking_again_costs_nothing_and_writes_nothing(study: Path):
     before = _stamps(study)
-    result = runner.invoke(app, ["run", "--out", str(study), str(study)])
+    result = runner.invoke(app, ["run", "--out", str(study)])
     assert result.exit_code == 0, result.stderr
     assert result.stderr.count("already done") == len(STAGES)
     assert _stamps(study) == before

@@ -16,5 +16,5 @@ def assess(craft: StudyArgument = None, out: Out = None, json: Json = False, deb
         chain = open_chain(reply, craft, out).keep_speed()
         chain.judge()
         verdict = chain.verdict()
-        reply.summary |= {"words": verdict.words}
-        reply.say(verdict.words)
+        reply.summary |= verdict
+        reply.tell(verdict["words"])

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from towtank.tank.run import Run
     from towtank.tank.tank import Tank
     from towtank.trials.trajectory import Trajectory
-    from towtank.verdict.table import Verdict
 
 STAGES = ("craft", "plan", "tow", "derive", "trials", "verdict", "report")
 
@@ -296,11 +295,13 @@ class Chain:
         write_verdict(assess(self.model(), self.trajectories()), self._replacing(self.study.verdict))
         return (self.study.verdict,)
 
-    def verdict(self) -> Verdict:
-        """The verdict of the study."""
-        from towtank.verdict.files import read_verdict
+    def verdict(self) -> dict[str, Any]:
+        """What the verdict of the study says: level, speed, both planes, elevator reversal, words."""
+        from towtank.artefact import read_json
 
-        return read_verdict(self.study.verdict)
+        document = read_json(self.study.verdict, "towtank/verdict/1")
+        keys = ("level", "speed", "horizontal", "vertical", "elevator_reversal_speed", "words")
+        return {key: document[key] for key in keys}
 
     def publish(self) -> None:
         """The report of everything the study holds."""

@@ -5,6 +5,7 @@ Results go to stdout, remarks and errors to stderr. With ``--json`` stdout holds
 
 from __future__ import annotations
 
+import textwrap
 import time
 import traceback
 from collections.abc import Iterator
@@ -20,6 +21,8 @@ from towtank.progress import Progress, Silent
 
 DONE, BAD_INPUT, FAILED, STOPPED = 0, 2, 3, 130
 """Exit codes."""
+
+WIDTH = 100
 
 RESUME = " The same command resumes."
 
@@ -46,6 +49,10 @@ class Reply:
         """A result for people, on stdout."""
         if not self.json:
             typer.echo(text)
+
+    def tell(self, text: str) -> None:
+        """Paragraphs for people, on stdout, broken to lines of ``WIDTH``."""
+        self.say("\n\n".join(textwrap.fill(part, WIDTH) for part in text.split("\n\n")))
 
     def log(self, text: str) -> None:
         """A remark, on stderr."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from towtank.cli.chain import open_chain
-from towtank.cli.options import CraftArgument, Debug, Json, Out, Speed
+from towtank.cli.options import Debug, Json, Out, Speed, StudyArgument
 from towtank.cli.reply import answering
 
 
-def run(craft: CraftArgument, speed: Speed = None, out: Out = None, json: Json = False, debug: Debug = False) -> None:
+def run(
+    craft: StudyArgument = None, speed: Speed = None, out: Out = None, json: Json = False, debug: Debug = False
+) -> None:
     """Do the whole chain, from craft file to report.
 
     Captive tests, derivatives, model, trials, verdict and report go into the study folder.
@@ -25,5 +27,5 @@ def run(craft: CraftArgument, speed: Speed = None, out: Out = None, json: Json =
         chain.judge()
         chain.publish()
         verdict = chain.verdict()
-        reply.summary |= {"craft": chain.craft.name, "stages_s": chain.wall, "words": verdict.words}
-        reply.say(f"\n{verdict.words}\n\nReport: {chain.study.report}")
+        reply.summary |= {"craft": chain.craft.name, "stages_s": chain.wall, "verdict": verdict}
+        reply.tell(f"\n{verdict['words']}\n\nReport: {chain.study.report}")
