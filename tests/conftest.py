@@ -1,1 +1,1 @@
-"""Shared cases of the tests, such as ``synthetic_craft``, are imported from this folder, which pytest puts on the path."""
+"""Shared cases such as ``synthetic_craft`` are imported from this folder, which pytest puts on the path."""

@@ -19,7 +19,7 @@ SUBOFF = {
     "Nuv": -0.011254, "Nvv": 0.010, "Nur": -0.003064, "Nrr": -0.0040, "Kup": -1.2e-5, "Kpp": 0.0,
     "Xuudd": -0.004, "Yuudr": 0.005929, "Nuudr": -0.002217, "Kuudroll": 0.0005,
 }  # fmt: skip
-STABLE = {**SUBOFF, "Yuv": -0.020, "Nuv": -0.0040, "Yur": 0.0090, "Nur": -0.0060}
+STABLE = {**SUBOFF, "Yuv": -0.020, "Nuv": -0.0060, "Yur": 0.0090, "Nur": -0.0045}
 
 
 class Cylinder:

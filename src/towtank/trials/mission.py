@@ -19,7 +19,7 @@ from towtank.trials.outcome import trajectory
 from towtank.trials.pilot.law import Pilot
 from towtank.trials.start import Setting, fin_limit, setting
 from towtank.trials.steady import turning_diameter
-from towtank.trials.steps import adrift
+from towtank.trials.steps import adrift, drifting
 from towtank.trials.trajectory import Trajectory
 
 LOOKAHEAD = 2.5
@@ -123,7 +123,7 @@ def _leg(s: Setting, name: str, line: LineOfSight, depth: float, early: float, c
     expected = line.length / max(s.speed - against, 0.2 * s.speed)
     across = current[1] * math.cos(line.course) - current[0] * math.sin(line.course)
     scaled = replace(line, gain=line.gain * s.speed, crab=math.asin(across / s.speed))
-    helm = replace(s.helm, guidance=scaled, depth=depth)
+    helm = replace(s.helm, guidance=scaled, depth=depth, current=drifting(current))
     return Leg(name, helm, PATIENCE * expected, _passed(line, early), required=True)
 
 

@@ -54,7 +54,7 @@ def spiral(
     rudders = limit * np.array([*STEPS, *(-x for x in reversed(STEPS[:-1]))])
     sweep = np.concatenate([rudders, rudders[::-1][1:]])
     # Turning slows the craft down, so a length takes longer than at the approach speed.
-    turns = steady_turns(model, s.speed, 0.5 / s.convective)
+    turns = steady_turns(model, s.speed)
     reached = np.abs(turns.rudder) <= 1.05 * abs(limit)
     convective = s.convective * s.speed / max(float(turns.speed[reached].min()), 0.3 * s.speed)
     flight = free_run(model, s.state, _legs(base, sweep, convective), thrust=s.thrust, interval=s.convective / 8.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.optimize import root
 
 from towtank.errors import TrialError
@@ -14,11 +15,13 @@ from towtank.model.equations import Model
 
 @dataclass(frozen=True)
 class SteadyTurns:
-    """Steady turns in the horizontal plane, by rising yaw rate; N points.
+    """Steady turns in the horizontal plane, by rising curvature; N points.
 
-    rate (N,) : yaw rate [rad/s].   rudder, drift (N,) [rad].   speed (N,) [m/s].
+    curvature (N,) : yaw rate over speed ahead [1/m].   rate (N,) : yaw rate [rad/s].   rudder, drift (N,) [rad].
+    speed (N,) [m/s].
     """
 
+    curvature: Array
     rate: Array
     rudder: Array
     drift: Array
@@ -27,34 +30,31 @@ class SteadyTurns:
     def rudder_span(self) -> float:
         """Rudder [rad] between the folds of the curve: the width of the spiral's loop; 0 for a single-valued curve.
 
-        Source     Folds where d(rudder)/d(rate) changes sign, from a cubic through the points.
+        Source     Folds where d(rudder)/d(curvature) changes sign, from a cubic through the points.
         """
-        from scipy.interpolate import CubicSpline
-
-        spline = CubicSpline(self.rate, self.rudder)
-        folds = spline.derivative().roots(extrapolate=False)
-        heights = spline(folds)
+        spline = self._over(self.rudder)
+        heights = spline(spline.derivative().roots(extrapolate=False))
         return float(np.ptp(heights)) if len(heights) > 1 else 0.0
 
     def slope(self) -> float:
         """d(rate)/d(rudder) at zero rate [1/s]; its sign is that of the rudder's effect on a stable craft."""
-        i = int(np.argmin(np.abs(self.rate)))
-        low, high = max(i - 1, 0), min(i + 1, len(self.rate) - 1)
-        return float((self.rate[high] - self.rate[low]) / (self.rudder[high] - self.rudder[low]))
+        return float(self._over(self.rate).derivative()(0.0) / self._over(self.rudder).derivative()(0.0))
 
     def free_rate(self) -> float:
         """Largest turning rate [rad/s] with the rudder amidships: half the height of the loop; 0 when stable."""
-        from scipy.interpolate import CubicSpline
+        roots = self._over(self.rudder).roots(extrapolate=False)
+        return float(np.abs(self._over(self.rate)(roots)).max()) if len(roots) > 1 else 0.0
 
-        roots = CubicSpline(self.rate, self.rudder).roots(extrapolate=False)
-        return float(np.abs(roots).max()) if len(roots) > 1 else 0.0
+    def _over(self, values: Array) -> CubicSpline:
+        return CubicSpline(self.curvature, values)
 
 
-def steady_turns(model: Model, speed: float, largest: float, points: int = 25) -> SteadyTurns:
-    """Steady turns from -``largest`` to +``largest`` [rad/s] at the thrust of ``speed`` [m/s].
+def steady_turns(model: Model, speed: float, largest: float = 0.6, points: int = 25) -> SteadyTurns:
+    """Steady turns with a yaw rate r L/u from -``largest`` to +``largest``, at the thrust of ``speed`` [m/s].
 
-    The yaw rate is the parameter of the continuation: at a given rate there is one rudder angle even where the S-curve
-    of an unstable craft folds back. A branch ends where no steady turn is found.
+    The curvature is the parameter of the continuation: at a given curvature there is one rudder angle even where the
+    S-curve of an unstable craft folds back, and one yaw rate even where the loss of speed makes the rate fall again. A
+    branch ends where no steady turn is found.
 
     Source     Zero accelerations u, v, r in ``Model.rates`` with w, p, q, phi and theta zero; scipy's hybrid method.
     Departure  A free-running craft pitches and rolls in a turn; this curve leaves that out, as the classical one does.
@@ -65,45 +65,52 @@ def steady_turns(model: Model, speed: float, largest: float, points: int = 25) -
     TrialError
         No steady turn at all.
     """
-    up = _branch(model, speed, np.linspace(0.0, largest, points))
-    down = _branch(model, speed, np.linspace(0.0, -largest, points))
+    # Points crowd towards straight flight, where the curve bends most.
+    curvatures = largest / model.craft.length * np.linspace(0.0, 1.0, points) ** 1.5
+    up = _branch(model, speed, curvatures)
+    down = _branch(model, speed, -curvatures)
     rows = np.array([*reversed(down), *up[1:]])
     if len(rows) < 5:
         raise TrialError(
             f"steady turns of {model.craft.name}: none found near straight flight at {speed:g} m/s. The craft has no "
             "rudder to turn with: look at Nuudr and Yuudr."
         )
-    rate, u, v, dr = rows.T
-    return SteadyTurns(rate, dr, np.arctan2(-v, u), np.hypot(u, v))
+    curvature, u, v, dr = rows.T
+    return SteadyTurns(curvature, curvature * u, dr, np.arctan2(-v, u), np.hypot(u, v))
 
 
 def turning_diameter(model: Model, speed: float, rudder: float) -> float:
     """Diameter [m] of the tightest steady turn that takes no more than ``rudder`` [rad]; infinite if there is none."""
-    turns = steady_turns(model, speed, 0.5 * speed / model.craft.length, points=13)
+    turns = steady_turns(model, speed, points=13)
     able = (np.abs(turns.rudder) <= rudder) & (np.abs(turns.rate) > 0.0)
     return float((2.0 * turns.speed[able] / np.abs(turns.rate[able])).min()) if able.any() else float("inf")
 
 
-def _branch(model: Model, U: float, rates: Array) -> list[tuple[float, ...]]:
+def _branch(model: Model, U: float, curvatures: Array) -> list[tuple[float, ...]]:
     length, thrust = model.craft.length, model.thrust(U)
     mixing = model.craft.mixing[:, 0]
     size = np.array([U, U, U / length]) * U / length
 
-    def residual(unknown: Array, rate: float) -> Array:
+    def residual(unknown: Array, curvature: float) -> Array:
         u, v, dr = unknown[0] * U, unknown[1] * U, unknown[2]
+        rate = float(curvature * u)
         fins = [float(m * dr) for m in mixing]
         out = model.rates([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(u), float(v), 0.0, 0.0, 0.0, rate, *fins], fins, thrust)
         return np.array([out[6], out[7], out[11]]) / size
 
     guess = before = np.array([1.0, 0.0, 0.0])
     rows: list[tuple[float, ...]] = []
-    for rate in rates:
-        found = root(residual, guess, args=(float(rate),), tol=1e-9)
+    for i, curvature in enumerate(curvatures):
+        found = root(residual, guess, args=(float(curvature),), tol=1e-9)
         if np.abs(found.fun).max() > 1e-6 or found.x[0] <= 0.05:
             break
-        rows.append((float(rate), found.x[0] * U, found.x[1] * U, found.x[2]))
+        rows.append((float(curvature), found.x[0] * U, found.x[1] * U, found.x[2]))
         # The next guess lies on the line through the last two solutions.
-        guess, before = (2.0 * found.x - before, found.x) if len(rows) > 1 else (found.x, found.x)
+        guess = found.x
+        if 0 < i < len(curvatures) - 1:
+            stride = (curvatures[i + 1] - curvature) / (curvature - curvatures[i - 1])
+            guess = found.x + stride * (found.x - before)
+        before = found.x
         # hybr steps in proportion to each unknown: round-off in place of a zero would leave it without a step.
         guess = np.where(np.abs(guess) < 1e-10, 0.0, guess)
     return rows

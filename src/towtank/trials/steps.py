@@ -109,9 +109,10 @@ def _run(
     start = s.state.copy()
     # The craft is at rest in the moving water: speed over ground is speed through the water plus the current.
     start[6:9] += adrift(s, current)
+    helm = replace(s.helm, current=drifting(current))
     legs = [
-        Leg("before", replace(s.helm, heading=headings[0], depth=depths[0]), LEAD * s.convective),
-        Leg("after", replace(s.helm, heading=headings[1], depth=depths[1]), lengths * s.convective),
+        Leg("before", replace(helm, heading=headings[0], depth=depths[0]), LEAD * s.convective),
+        Leg("after", replace(helm, heading=headings[1], depth=depths[1]), lengths * s.convective),
     ]
     return free_run(model, start, legs, thrust=s.thrust, interval=s.convective / 16.0, current=tuple(current))
 
@@ -135,6 +136,12 @@ def adrift(s: Setting, current: Sequence[float]) -> Array:
             "against it. Give a slower current or a higher speed."
         )
     return np.asarray(rotation(s.state[3:6]).T @ water)
+
+
+def drifting(current: Sequence[float]) -> tuple[float, float, float]:
+    """``current`` as three floats."""
+    north, east, down = (float(x) for x in current)
+    return north, east, down
 
 
 def _response(

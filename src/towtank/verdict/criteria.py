@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.model.values import to_variant
+from towtank.symbols import LOADS, RATES
 
 SAMPLES = 2000
 SEED = 20
@@ -73,32 +74,60 @@ def horizontal_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Arr
     """A (n, 2, 2) of d(v, r)/dt for ``v`` = term -> (n,), at ``speed`` [m/s].
 
     Source     fossen2021, ch. 6: linear sway-yaw equations; damping in the lumped variant.
-    Valid      Small motions, fins at rest.
+    Departure  The mass matrix is the whole one, so that a CG off the axis has its part.
+    Valid      Small motions, fins at rest, no roll.
     """
-    b = model.constants.body
-    get = _getter(v)
-    M = _matrix([[b.m - get("Yvdot"), b.m * b.xG - get("Yrdot")], [b.m * b.xG - get("Nvdot"), b.Izz - get("Nrdot")]])
-    D = speed * _matrix([[get("Yuv"), get("Yur") - b.m], [get("Nuv"), get("Nur") - b.m * b.xG]])
-    return np.asarray(np.linalg.solve(M, D))
+    b, get = model.constants.body, _getter(v)
+    zero = np.zeros(len(get("Yuv")))
+    D = speed * _matrix(
+        [
+            [zero, zero],
+            [get("Yuv"), get("Yur") - b.m],
+            [zero, zero],
+            [get("Kuv"), get("Kur") + b.m * b.zG],
+            [zero, zero],
+            [get("Nuv"), get("Nur") - b.m * b.xG],
+        ]
+    )
+    return np.asarray(np.linalg.solve(_masses(model, v), D)[:, [1, 5], :])
 
 
 def vertical_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Array:
     """A (n, 3, 3) of d(w, q, theta)/dt for ``v`` = term -> (n,), at ``speed`` [m/s].
 
     Source     fossen2021, ch. 8: linear heave-pitch equations with the righting moment.
-    Valid      Small motions about level flight, fins at rest.
+    Departure  As ``horizontal_matrix``.
+    Valid      Small motions about level flight at constant speed, fins at rest.
     """
-    b = model.constants.body
-    get = _getter(v)
-    M = _matrix([[b.m - get("Zwdot"), -b.m * b.xG - get("Zqdot")], [-b.m * b.xG - get("Mwdot"), b.Iyy - get("Mqdot")]])
-    D = speed * _matrix([[get("Zuw"), get("Zuq") + b.m], [get("Muw"), get("Muq") - b.m * b.xG]])
+    b, get = model.constants.body, _getter(v)
+    zero = np.zeros(len(get("Zuw")))
     stiffness = b.g * (b.m * b.zG - b.b * b.zB)
-    n = len(M)
-    A = np.zeros((n, 3, 3))
-    A[:, :2, :2] = np.linalg.solve(M, D)
-    A[:, :2, 2] = np.linalg.solve(M, np.tile(np.array([[0.0], [-stiffness]]), (n, 1, 1)))[:, :, 0]
+    D = _matrix(
+        [
+            [zero, zero, zero - b.g * (b.m - b.b)],
+            [zero, zero, zero],
+            [speed * get("Zuw"), speed * (get("Zuq") + b.m), zero],
+            [zero, zero, zero],
+            [speed * get("Muw"), speed * (get("Muq") - b.m * b.xG), zero - stiffness],
+            [zero, zero, zero],
+        ]
+    )
+    A = np.zeros((len(zero), 3, 3))
+    A[:, :2] = np.linalg.solve(_masses(model, v), D)[:, [2, 4], :]
     A[:, 2, 1] = 1.0
     return A
+
+
+def _masses(model: Model, v: Mapping[str, Array]) -> Array:
+    """M_RB - M_A (n, 6, 6) of the sampled derivatives."""
+    size = len(next(iter(v.values())))
+    M = np.tile(model.mass_matrix, (size, 1, 1))
+    for i, load in enumerate(LOADS):
+        for j, rate in enumerate(RATES):
+            name = f"{load}{rate}dot"
+            if name in v:
+                M[:, i, j] += model.derivatives[name] - v[name]
+    return M
 
 
 def index(model: Model, v: Mapping[str, Array], plane: str) -> Array:
@@ -142,7 +171,7 @@ def plane_criteria(model: Model, plane: str, speed: float) -> PlaneCriteria:
     )
 
 
-def _getter(v: Mapping[str, Array]):  # type: ignore[no-untyped-def]
+def _getter(v: Mapping[str, Array]) -> Callable[[str], Array]:
     size = len(next(iter(v.values())))
     return lambda name: v.get(name, np.zeros(size))
 

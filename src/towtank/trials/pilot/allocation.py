@@ -42,7 +42,7 @@ class Allocation:
             share = 1.0
             for want, have, limit in zip(asked, used, self.limits, strict=True):
                 total = have + share * want
-                if abs(total) > limit:
+                if want != 0.0 and abs(total) > limit:
                     room = max(limit - have, 0.0) if total > 0.0 else max(limit + have, 0.0)
                     share = min(share, room / abs(want))
             for i in group:

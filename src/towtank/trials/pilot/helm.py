@@ -34,6 +34,7 @@ class Helm:
 
     rudder, elevator [rad] : used where the pilot has no order.   heading [rad], depth [m] : orders to the pilot, or
     None.   guidance : gives the heading instead.   damp_roll : the pilot damps roll with what the fins have left.
+    current (3,) : velocity of the water [m/s, NED].
     """
 
     allocation: Allocation
@@ -44,6 +45,7 @@ class Helm:
     depth: float | None = None
     guidance: Guidance | None = None
     damp_roll: bool = True
+    current: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def wanted_heading(self, state: Sequence[float], integral: float) -> tuple[float | None, float]:
         """Heading wanted [rad] or None, and the rate of the guidance integral."""
@@ -51,12 +53,20 @@ class Helm:
             return self.heading, 0.0
         return self.guidance.heading(state[0], state[1], integral)
 
+    def water_speed(self, state: Sequence[float]) -> float:
+        """Speed ahead through the water [m/s], for the pilot's schedule: what a log shows."""
+        north, east, down = self.current
+        theta, psi = state[4], state[5]
+        return state[6] - cos(theta) * (cos(psi) * north + sin(psi) * east) + sin(theta) * down
+
     def order(self, state: Sequence[float], extra: Sequence[float]) -> tuple[Command, tuple[float, float, float]]:
         """Granted virtual command [rad] and rates of the helm's own states, for the craft's ``state`` (12 + n)."""
         pilot = self.pilot
         if pilot is None:
             return self.allocation((self.rudder, self.elevator, 0.0), RUDDER_FIRST), (0.0, 0.0, 0.0)
         heading, guiding = self.wanted_heading(state, extra[2])
+        falling = sinking(state)
+        state = [*state[:6], self.water_speed(state), *state[7:]]
         rudder, elevator, held = self.rudder, self.elevator, [True, True]
         errors = [0.0, 0.0]
         priority: Order = YAW_AND_PITCH_FIRST
@@ -66,7 +76,7 @@ class Helm:
         else:
             priority = RUDDER_FIRST
         if self.depth is not None:
-            elevator, held[1] = pilot.elevator(state, sinking(state), self.depth, extra[1])
+            elevator, held[1] = pilot.elevator(state, falling, self.depth, extra[1])
             errors[1] = self.depth - state[2]
         elif heading is not None:
             priority = ELEVATOR_FIRST
