@@ -28,4 +28,5 @@ def run(
         chain.publish()
         verdict = chain.verdict()
         reply.summary |= {"craft": chain.craft.name, "stages_s": chain.wall, "verdict": verdict}
-        reply.tell(f"\n{verdict['words']}\n\nReport: {chain.study.report}")
+        reply.say("")
+        reply.tell(f"{verdict['words']}\n\nReport: {chain.study.report}")
