@@ -14,6 +14,6 @@ def test_validation_table_is_what_the_code_gives() -> None:
     assert stored["schema"] == fresh["schema"]
     assert [row["quantity"] for row in stored["rows"]] == [row["quantity"] for row in fresh["rows"]]
     for old, new in zip(stored["rows"], fresh["rows"], strict=True):
-        # Another processor or library may differ in the last digits of the linear solve; make validate rewrites the file.
+        # Another processor or library may differ in the last digits of the solve; make validate rewrites the file.
         for key in ("predicted", "low", "high"):
             assert new[key] == pytest.approx(old[key], rel=1e-3, abs=1e-8), (new["quantity"], key)
