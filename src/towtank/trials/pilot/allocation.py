@@ -35,6 +35,8 @@ class Allocation:
 
         Source     Allocator of the LAUV: yaw and pitch first, roll from the rest (THEORY section 5).
         """
+        if all(abs(angle) <= limit for angle, limit in zip(self.fins(command), self.limits, strict=True)):
+            return command
         granted = [0.0, 0.0, 0.0]
         used = [0.0] * len(self.limits)
         for group in order:
