@@ -37,8 +37,6 @@ class Allocation:
         """
         if all(abs(angle) <= limit for angle, limit in zip(self.fins(command), self.limits, strict=True)):
             return command
-        if self._has_room(command):
-            return command
         granted = [0.0, 0.0, 0.0]
         used = [0.0] * len(self.limits)
         for group in order:
@@ -53,14 +51,6 @@ class Allocation:
                 granted[i] = share * command[i]
             used = [have + share * want for have, want in zip(used, asked, strict=True)]
         return granted[0], granted[1], granted[2]
-
-    def _has_room(self, command: Command) -> bool:
-        """Whether no fin meets its limit whatever the signs, so that no order of service can matter."""
-        dr, de, da = (abs(x) for x in command)
-        for (a, b, c), limit in zip(self.rows, self.limits, strict=True):
-            if abs(a) * dr + abs(b) * de + abs(c) * da > limit:
-                return False
-        return True
 
     def fins(self, command: Command) -> list[float]:
         """Fin angles (n,) [rad] of ``command``."""
