@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from towtank.cli.reply import Remarks, Reply
 from towtank.cli.study import Study, file_hash, program_hash
 from towtank.errors import ArtefactError, CraftError, InputError
+from towtank.parallel import cores
 from towtank.provenance import digest
 
 if TYPE_CHECKING:
@@ -260,7 +261,7 @@ class Chain:
     def _trials(self) -> Sequence[Path]:
         from towtank.trials.standard import standard_trials
 
-        return self._write_trials(standard_trials(self.model(), self.reply.progress))
+        return self._write_trials(standard_trials(self.model(), self.reply.progress, cores()))
 
     def add_trial(self, trajectory: Trajectory) -> None:
         """Write one more trial beside those of the study."""
@@ -311,5 +312,5 @@ class Chain:
     def _publish(self) -> Sequence[Path]:
         from towtank.report.build import report_study
 
-        report_study(self.study.root, self.study.report)
+        report_study(self.study.root, self.study.report, workers=cores())
         return (self.study.report,)

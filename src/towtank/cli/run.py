@@ -5,6 +5,15 @@ from __future__ import annotations
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, Speed, StudyArgument
 from towtank.cli.reply import answering
+from towtank.parallel import cores, prepare
+
+PRELOADED = (
+    "towtank.trials.standard",
+    "towtank.report.build",
+    "matplotlib.figure",
+    "matplotlib.backends.backend_svg",
+)
+"""What the processes of later stages need, imported while the first stages run."""
 
 
 def run(
@@ -18,6 +27,13 @@ def run(
     Example: towtank run hokie
     """
     with answering("run", json, debug) as reply:
+        if cores() > 1:
+            prepare(
+                "towtank.trials.standard",
+                "towtank.report.build",
+                "matplotlib.figure",
+                "matplotlib.backends.backend_svg",
+            )
         chain = open_chain(reply, craft, out, speed)
         chain.prepare()
         chain.make_plan()

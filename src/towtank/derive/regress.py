@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from towtank.derive.system import System
 from towtank.frames import Array
@@ -108,7 +108,7 @@ def _student(influence: Array, block: NDArray[np.intp]) -> Array:
     np.add.at(share, where, influence.T**2)
     share /= np.maximum(share.sum(axis=0), 1e-300)
     freedom = np.maximum(1.0 / np.maximum((share**2).sum(axis=0), 1e-12) - 1.0, 2.0)
-    return np.asarray(student.ppf(0.975, freedom) / 1.959964)
+    return np.asarray(stdtrit(freedom, 0.975) / 1.959964)
 
 
 def _jackknife(white: Array, error: Array, block: NDArray[np.intp], rows: NDArray[np.bool_], misfit: float) -> Array:

@@ -12,6 +12,7 @@ from typing import Any
 
 from towtank.artefact import write_text
 from towtank.figures.paper import level_words
+from towtank.parallel import each
 from towtank.provenance import VERSION
 from towtank.report import of_craft, of_model, of_tests, of_trials, of_trust, of_verdict
 from towtank.report.blocks import Section, View
@@ -34,6 +35,9 @@ SECTIONS: tuple[Callable[[Study, Sketchbook], Section], ...] = (
     of_tests.appendix,
 )
 """In the order of ITTC 7.5-02-06-02 and 7.5-02-06-03, with the summary before and the run list after."""
+
+MOST_DRAWN = (of_tests.forces_section, of_trials.trials, of_craft.craft)
+"""Sections worth starting first when several processes share the work."""
 
 
 def report(path: str | Path, *things: Any, title: str = "") -> Path:
@@ -58,24 +62,26 @@ def report(path: str | Path, *things: Any, title: str = "") -> Path:
     return write_text(Path(path), page(gather(things), title))
 
 
-def report_study(folder: str | Path, path: str | Path | None = None, title: str = "") -> Path:
+def report_study(folder: str | Path, path: str | Path | None = None, title: str = "", workers: int = 1) -> Path:
     """Write the report of a study folder, by default as ``report.html`` in it. A missing stage is named in the page.
+
+    workers : processes that share the drawing (see ``towtank.parallel``).
 
     Raises
     ------
     ArtefactError
         The folder does not exist, or the file cannot be written.
     """
-    return write_text(Path(path) if path else Path(folder) / "report.html", page(read_study(folder), title))
+    return write_text(Path(path) if path else Path(folder) / "report.html", page(read_study(folder), title, workers))
 
 
-def page(study: Study, title: str = "") -> str:
+def page(study: Study, title: str = "", workers: int = 1) -> str:
     """The HTML text of a study."""
     import jinja2
 
-    book = Sketchbook()
-    with _collector_at_rest():
-        sections = [section(study, book) for section in SECTIONS]
+    queue = sorted(range(len(SECTIONS)), key=lambda i: SECTIONS[i] not in MOST_DRAWN)
+    drawn = dict(zip(queue, each(_section, study, queue, workers), strict=True))
+    sections = [drawn[i] for i in range(len(SECTIONS))]
     moving = any(isinstance(block, View) for section in sections for block in section.blocks)
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
@@ -90,6 +96,11 @@ def page(study: Study, title: str = "") -> str:
         three=_text("vendor/three.min.js") if moving else "",
         viewer=_text("viewer.js"),
     )
+
+
+def _section(study: Study, number: int) -> Section:
+    with _collector_at_rest():
+        return SECTIONS[number](study, Sketchbook(f"s{number}"))
 
 
 @contextmanager

@@ -42,10 +42,10 @@ _DECIMALS = re.compile(r"(?<![#\w])(-?\d+\.\d{2})\d+")
 
 
 class Sketchbook:
-    """Draws figures under one style and gives each SVG ids of its own."""
+    """Draws figures under one style and gives each SVG ids of its own, beginning with ``prefix``."""
 
-    def __init__(self) -> None:
-        self.count = 0
+    def __init__(self, prefix: str = "") -> None:
+        self.prefix, self.count = prefix, 0
 
     def draw(self, function: Callable[..., Axes], *args: Any, caption: str, **options: Any) -> Picture:
         """Picture of ``function(*args, **options)``."""
@@ -88,7 +88,7 @@ class Sketchbook:
         share = round(min(100.0 * figure.get_figwidth() / PAGE, 100.0), 1)
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-        return Picture(inline(text.getvalue(), f"f{self.count}-"), caption, share)
+        return Picture(inline(text.getvalue(), f"{self.prefix}f{self.count}-"), caption, share)
 
 
 def inline(svg: str, prefix: str) -> str:

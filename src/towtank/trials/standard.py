@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from towtank.errors import TrialError
 from towtank.model.equations import Model
+from towtank.parallel import each
 from towtank.progress import Progress, Silent
 from towtank.trials.circle import turning_circle
 from towtank.trials.mission import lawnmower
@@ -47,12 +48,28 @@ AS_LOADED = ("straight run",)
 """Trials run as the craft is loaded even when it cannot be flown level."""
 
 
-def standard_trials(model: Model, progress: Progress | None = None) -> tuple[Trajectory, ...]:
+LONGEST_FIRST = ("spiral", "lawnmower", "depth step")
+"""Trials worth starting first when several processes share the work."""
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """What every standard trial of a craft shares."""
+
+    loaded: Model
+    neutral: Model
+    pilot: Pilot | None
+    notes: tuple[str, ...]
+
+
+def standard_trials(model: Model, progress: Progress | None = None, workers: int = 1) -> tuple[Trajectory, ...]:
     """All standard trials of ``model`` at its craft's speed, with one pilot designed from it.
 
     A craft whose weight residual cannot be carried level at this speed is ballasted to neutral for its trials, as a
     crew would do; the straight run is made as loaded, so that the sinking is seen. A craft for which no pilot can be
     designed gets the open-loop trials only. A craft without fins gets the straight run. The trajectories' notes say so.
+
+    workers : processes that share the trials (see ``towtank.parallel``).
 
     Raises
     ------
@@ -60,28 +77,34 @@ def standard_trials(model: Model, progress: Progress | None = None) -> tuple[Tra
         The craft's speed is not positive.
     """
     progress = progress or Silent()
+    setting = _setting(model)
+    names = list(OPEN_LOOP) if model.craft.fins else ["straight run"]
+    if setting.pilot is not None:
+        names += list(CLOSED_LOOP)
+    progress.start("trials", len(names))
+    made = {}
+    queue = sorted(names, key=lambda name: name not in LONGEST_FIRST)
+    for name, trajectory in zip(queue, each(_made, setting, queue, workers), strict=True):
+        made[name] = trajectory
+        progress.step("trials", name)
+    progress.done("trials")
+    return tuple(made[name] for name in names)
+
+
+def _setting(model: Model) -> _Setting:
     trim = level_trim(model, model.craft.speed)
     neutral = model if trim.holds or not model.craft.fins else ballasted(model)
     notes = [] if neutral is model else [f"Ballasted to neutral for this trial: {trim.why}."]
-    pilot: Pilot | None
     try:
-        pilot = design_pilot(neutral)
+        return _Setting(model, neutral, design_pilot(neutral), tuple(notes))
     except TrialError as error:
-        pilot, notes = None, [*notes, f"No pilot: {error}"]
-    trials = dict(OPEN_LOOP) if model.craft.fins else {"straight run": OPEN_LOOP["straight run"]}
-    if pilot is not None:
-        trials |= CLOSED_LOOP
-    progress.start("trials", len(trials))
-    out = []
-    for name, trial in trials.items():
-        loaded = name in AS_LOADED
-        made = trial(model if loaded else neutral, pilot)
-        out.append(made if loaded else _noted(made, notes))
-        progress.step("trials", name)
-    progress.done("trials")
-    return tuple(out)
+        return _Setting(model, neutral, None, (*notes, f"No pilot: {error}"))
 
 
-def _noted(trial: Trajectory, notes: list[str]) -> Trajectory:
-    merged = [*trial.provenance.get("notes", []), *notes]
-    return replace(trial, provenance={**trial.provenance, "notes": merged})
+def _made(setting: _Setting, name: str) -> Trajectory:
+    trial = {**OPEN_LOOP, **CLOSED_LOOP}[name]
+    if name in AS_LOADED:
+        return trial(setting.loaded, setting.pilot)
+    made = trial(setting.neutral, setting.pilot)
+    merged = [*made.provenance.get("notes", []), *setting.notes]
+    return replace(made, provenance={**made.provenance, "notes": merged})

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+from scipy.special import ndtri
 
 from towtank.frames import Array
 
@@ -56,15 +57,16 @@ NOMINAL: dict[str, float] = {item.name: item.value for item in CONSTANTS}
 
 @functools.lru_cache(maxsize=4)
 def sample(members: int, seed: int = 0) -> Mapping[str, Array]:
-    """Constants (members + 1,): the nominal set first, then a scrambled Sobol sample of the distributions."""
-    from scipy.stats import norm, qmc  # a second of import that settings() must not cost
+    """Constants (members + 1,): the nominal set first, then a Latin hypercube sample of the distributions.
 
+    Source     mckay1979: each constant takes every 1/members share of its distribution once.
+    """
     values = {item.name: np.full(members + 1, item.value) for item in CONSTANTS}
     if members == 0:
         return MappingProxyType(values)
-    points = 2 ** int(np.ceil(np.log2(members)))
-    unit = qmc.Sobol(len(CONSTANTS), seed=seed).random(points)[:members]
-    normal = norm.ppf(np.clip(unit, 1e-6, 1 - 1e-6))
+    rng = np.random.default_rng(seed)
+    ranks = rng.permuted(np.tile(np.arange(members), (len(CONSTANTS), 1)), axis=1)
+    normal = ndtri((ranks.T + rng.uniform(size=(members, len(CONSTANTS)))) / members)
     for item, z in zip(CONSTANTS, normal.T, strict=True):
         drawn = item.value + item.spread * z if item.additive else item.value * np.exp(item.spread * z)
         values[item.name][1:] = np.clip(drawn, *item.limits)
