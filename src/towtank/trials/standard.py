@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from towtank.errors import TrialError
 from towtank.model.equations import Model
 from towtank.parallel import each
@@ -15,7 +17,7 @@ from towtank.trials.pilot.design import design_pilot
 from towtank.trials.pilot.law import Pilot
 from towtank.trials.pullout import pull_out
 from towtank.trials.spiral import spiral
-from towtank.trials.start import ballasted, level_trim
+from towtank.trials.start import ballasted, fin_limit, level_trim
 from towtank.trials.steps import depth_step, heading_step
 from towtank.trials.straight import straight_run
 from towtank.trials.trajectory import Trajectory
@@ -23,16 +25,22 @@ from towtank.trials.zigzag import zigzag
 
 Trial = Callable[[Model, Pilot | None], Trajectory]
 
+
+def within(model: Model, degrees: float) -> str:
+    """The angle of a standard trial, or what the fins reach where that is less, as text."""
+    return f"{min(degrees, np.floor(10.0 * np.degrees(fin_limit(model))) / 10.0):.3g} deg"
+
+
 OPEN_LOOP: dict[str, Trial] = {
     "straight run": lambda m, p: straight_run(m, pilot=p),
-    "turning circle": lambda m, p: turning_circle(m, "15 deg", pilot=p, hold_depth=p is not None),
-    "zigzag 10/10": lambda m, p: zigzag(m, "10 deg", "10 deg", pilot=p, hold_depth=p is not None),
-    "zigzag 20/20": lambda m, p: zigzag(m, "20 deg", "20 deg", pilot=p, hold_depth=p is not None),
+    "turning circle": lambda m, p: turning_circle(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
+    "zigzag 10/10": lambda m, p: zigzag(m, within(m, 10.0), "10 deg", pilot=p, hold_depth=p is not None),
+    "zigzag 20/20": lambda m, p: zigzag(m, within(m, 20.0), "20 deg", pilot=p, hold_depth=p is not None),
     "zigzag 10/5 vertical": lambda m, p: zigzag(
-        m, "10 deg", "5 deg", plane="vertical", pilot=p, hold_depth=p is not None
+        m, within(m, 10.0), "5 deg", plane="vertical", pilot=p, hold_depth=p is not None
     ),
-    "spiral": lambda m, p: spiral(m, "15 deg", pilot=p, hold_depth=p is not None),
-    "pull-out": lambda m, p: pull_out(m, "15 deg", pilot=p, hold_depth=p is not None),
+    "spiral": lambda m, p: spiral(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
+    "pull-out": lambda m, p: pull_out(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
 }
 """Trials with the rudder or elevator open loop. The pilot holds depth and damps roll where there is one."""
 
