@@ -149,15 +149,20 @@ def stability_indices(model: Model, slopes: str = "origin") -> StabilityIndices:
     product has the same factor above and below the line, so the values themselves give the same number.
 
     Source     roddy1990; THEORY section 7. Restoring moments are left out: the limit of high speed.
-    Valid      Ahead.
+    Valid      Ahead, linear force and moment that damp; NaN otherwise (a wide fit may leave all damping to |v|v).
     """
     d = to_variant(with_slopes(model, slopes).derivatives, "lumped")
     m, xG = model.constants.body.m, model.constants.body.xG
     return StabilityIndices(
-        horizontal=1.0 - _ratio(d["Nuv"] * (d["Yur"] - m), d["Yuv"] * (d["Nur"] - xG * m)),
-        vertical=1.0 - _ratio(d["Muw"] * (d["Zuq"] + m), d["Zuw"] * (d["Muq"] - xG * m)),
+        horizontal=_index(d["Nuv"] * (d["Yur"] - m), d["Yuv"] * (d["Nur"] - xG * m)),
+        vertical=_index(d["Muw"] * (d["Zuq"] + m), d["Zuw"] * (d["Muq"] - xG * m)),
         slopes=slopes,
     )
+
+
+def _index(driving: float, damping: float) -> float:
+    """1 - driving / damping; NaN where the linear terms do not damp, since the sign then says nothing."""
+    return 1.0 - driving / damping if damping > 0.0 else float("nan")
 
 
 def elevator_reversal_speed(model: Model, slopes: str = "origin") -> float | None:

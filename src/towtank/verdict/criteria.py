@@ -134,14 +134,14 @@ def index(model: Model, v: Mapping[str, Array], plane: str) -> Array:
     """Stability index G (n,) of ``plane`` ("horizontal" or "vertical") for ``v`` = term -> (n,).
 
     Source     roddy1990; THEORY section 7. As ``model.linear.stability_indices``, for many sets at once.
-    Valid      Ahead; the limit of high speed in the vertical plane.
+    Valid      Ahead; the limit of high speed in the vertical plane. NaN where the linear terms do not damp.
     """
     b, get = model.constants.body, _getter(v)
     if plane == "horizontal":
         above, below = get("Nuv") * (get("Yur") - b.m), get("Yuv") * (get("Nur") - b.xG * b.m)
     else:
         above, below = get("Muw") * (get("Zuq") + b.m), get("Zuw") * (get("Muq") - b.xG * b.m)
-    return np.asarray(1.0 - np.divide(above, below, out=np.full_like(above, np.nan), where=below != 0.0))
+    return np.asarray(1.0 - np.divide(above, below, out=np.full_like(above, np.nan), where=below > 0.0))
 
 
 def plane_criteria(model: Model, plane: str, speed: float) -> PlaneCriteria:

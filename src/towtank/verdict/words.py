@@ -37,7 +37,12 @@ def _mode(c: PlaneCriteria) -> str:
 def _index(c: PlaneCriteria) -> str:
     low, high = c.index_range
     band = f", 90 % between {low:.2f} and {high:.2f}" if high > low else ""
-    wide = f"; {c.index_wide:.2f} on the wide fit" if c.slopes == "origin" else ""
+    wide = ""
+    if c.slopes == "origin":
+        has = np.isfinite(c.index_wide)
+        wide = (
+            f"; {c.index_wide:.2f} on the wide fit" if has else "; none on the wide fit, whose linear terms do not damp"
+        )
     where = "on slopes at the origin" if c.slopes == "origin" else "on the wide fit"
     return f"{c.index:.2f} {where}{band}{wide}"
 
