@@ -17,7 +17,7 @@ help:
 	@echo "make run       towtank run hokie, results in ./$(OUT)"
 	@echo "make test      ruff, mypy, import-linter, pytest"
 	@echo "make lint      the first three of these"
-	@echo "make validate  the longer checks (pytest -m validate)"
+	@echo "make validate  the longer checks; rewrites the validation table of the report"
 	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
 	@echo "make clean     remove $(VENV)/, caches and bench/"
 
@@ -46,6 +46,7 @@ test: lint
 	$(BIN)/pytest -m "not validate" -n $(JOBS) --dist loadfile
 
 validate: $(VENV)/.tools
+	$(BIN)/python validation/suboff.py
 	$(BIN)/pytest -m validate
 
 bench: $(VENV)/.installed
