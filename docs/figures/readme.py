@@ -1,4 +1,4 @@
-"""The picture of the README, drawn from the study that `towtank run hokie` wrote: python docs/figures/readme.py hokie."""
+"""The picture of the README, from the study that `towtank run hokie` wrote: python docs/figures/readme.py hokie."""
 
 from __future__ import annotations
 
