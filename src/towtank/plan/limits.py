@@ -92,7 +92,8 @@ Valid      Slender torpedo-like craft with stern fins, moving ahead.
 FREQUENCY_WARNING = {"sway": 2.0, "heave": 2.0}
 """w' of pure sway and heave above which unsteady lift reaches the derivatives; ``FREQUENCY_WARNING_ELSE`` otherwise.
 
-Source     ittc75020602 (sway below 1-2, yaw below 2-3); roddy1990 (yaw and pitch run at 2.8-4.1).
+Source     Practice of the field (sway below 1-2, yaw below 2-3), ascribed to ittc75020602 in THEORY section 4 and not
+           checked against its text; roddy1990 (yaw and pitch run at 2.8-4.1).
 """
 
 FREQUENCY_WARNING_ELSE = 4.0

@@ -22,6 +22,8 @@ from towtank.tank.record import record
 from towtank.tank.run import Run
 
 LEVEL = "semi-empirical"
+PHYSICS = 1
+"""Raised when a formula of the tank changes, so that runs made with the former one are not taken for its own."""
 MEMORY_TRAVEL = 1.3
 """Lead-in before a test, in lengths travelled: the longest memory is one length."""
 
@@ -59,6 +61,7 @@ class FastTank:
         """Everything that decides the result beside craft and test."""
         return {
             "tank": "fast",
+            "physics": PHYSICS,
             "parts": self.parts,
             "members": self.members,
             "memory": self.memory,
