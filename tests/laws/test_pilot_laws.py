@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 import synthetic_craft as synthetic
 from towtank.errors import InputError, TrialError
 from towtank.model.linear import horizontal
+from towtank.pilot.allocation import RUDDER_FIRST, allocation
+from towtank.pilot.design import design_pilot
+from towtank.pilot.effort import effort
+from towtank.pilot.law import wrapped
 from towtank.trials.integrate import Leg, free_run
 from towtank.trials.mission import lawnmower
-from towtank.trials.pilot.allocation import RUDDER_FIRST, allocation
-from towtank.trials.pilot.design import design_pilot
-from towtank.trials.pilot.effort import effort
-from towtank.trials.pilot.law import wrapped
 from towtank.trials.start import setting
 from towtank.trials.steps import depth_step, heading_step
 

@@ -11,8 +11,8 @@ from scipy.signal import StateSpace, lsim
 
 import synthetic_craft as synthetic
 from towtank.model.linear import horizontal, linearise
+from towtank.pilot.plant import block
 from towtank.trials.circle import turning_circle
-from towtank.trials.pilot.plant import block
 from towtank.trials.pullout import pull_out
 from towtank.trials.spiral import spiral
 from towtank.trials.start import ballasted, level_trim, setting, slowest_level_speed

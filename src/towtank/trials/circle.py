@@ -10,11 +10,11 @@ import numpy as np
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
+from towtank.pilot.helm import Helm, sinking
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
 from towtank.trials.integrate import Event, Flight, Leg, free_run
 from towtank.trials.outcome import trajectory
-from towtank.trials.pilot.helm import Helm, sinking
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.start import Setting, angle, fin_limit, setting
 from towtank.trials.trajectory import Trajectory
 

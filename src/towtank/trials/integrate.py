@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from towtank.errors import TrialError
 from towtank.frames import Array
 from towtank.model.equations import STILL, Model
-from towtank.trials.pilot.helm import EXTRA, Helm
+from towtank.pilot.helm import EXTRA, Helm
 
 METHOD = "RK23"
 RELATIVE = 1e-4

@@ -12,11 +12,11 @@ import numpy as np
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import STILL, Model
+from towtank.pilot.guidance import LineOfSight
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity, si
-from towtank.trials.guidance import LineOfSight
 from towtank.trials.integrate import Event, Flight, Leg, free_run
 from towtank.trials.outcome import trajectory
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.start import Setting, fin_limit, setting
 from towtank.trials.steady import turning_diameter
 from towtank.trials.steps import adrift, drifting

@@ -9,9 +9,9 @@ import numpy as np
 
 from towtank.frames import Array
 from towtank.model.equations import Model
+from towtank.pilot.effort import effort
 from towtank.provenance import provenance
 from towtank.trials.integrate import Flight
-from towtank.trials.pilot.effort import effort
 from towtank.trials.start import Setting
 from towtank.trials.trajectory import Trajectory
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from towtank.errors import InputError
 from towtank.model.equations import Model
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
 from towtank.trials.integrate import Flight, Leg, free_run
 from towtank.trials.outcome import trajectory
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.start import angle, fin_limit, setting
 from towtank.trials.trajectory import Trajectory
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from towtank.frames import Array
 from towtank.model.equations import Model
+from towtank.pilot.helm import Helm
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
 from towtank.trials.integrate import Flight, Leg, free_run
 from towtank.trials.outcome import trajectory
-from towtank.trials.pilot.helm import Helm
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.start import angle, fin_limit, setting
 from towtank.trials.steady import SteadyTurns, steady_turns
 from towtank.trials.trajectory import Trajectory

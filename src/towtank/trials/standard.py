@@ -10,11 +10,11 @@ import numpy as np
 from towtank.errors import TrialError
 from towtank.model.equations import Model
 from towtank.parallel import each
+from towtank.pilot.design import design_pilot
+from towtank.pilot.law import Pilot
 from towtank.progress import Progress, Silent
 from towtank.trials.circle import turning_circle
 from towtank.trials.mission import lawnmower
-from towtank.trials.pilot.design import design_pilot
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.pullout import pull_out
 from towtank.trials.spiral import spiral
 from towtank.trials.start import ballasted, fin_limit, level_trim

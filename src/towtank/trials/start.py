@@ -10,11 +10,11 @@ from scipy.optimize import root
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
+from towtank.pilot.allocation import allocation
+from towtank.pilot.design import design_pilot
+from towtank.pilot.helm import EXTRA, Helm
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity, si
-from towtank.trials.pilot.allocation import allocation
-from towtank.trials.pilot.design import design_pilot
-from towtank.trials.pilot.helm import EXTRA, Helm
-from towtank.trials.pilot.law import Pilot
 
 STEEPEST_TRIM = np.radians(30.0)
 

@@ -10,10 +10,10 @@ import numpy as np
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import STILL, Model
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity, si
 from towtank.trials.integrate import Flight, Leg, free_run
 from towtank.trials.outcome import crossing, peak, trajectory
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.start import Setting, angle, setting
 from towtank.trials.trajectory import Trajectory
 

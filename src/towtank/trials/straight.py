@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from towtank.model.equations import Model
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
 from towtank.trials.integrate import Leg, free_run
 from towtank.trials.outcome import trajectory
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.start import angle, setting
 from towtank.trials.trajectory import Trajectory
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from towtank.errors import InputError
 from towtank.model.equations import Model
+from towtank.pilot.helm import Helm
+from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
 from towtank.trials import start
 from towtank.trials.integrate import Event, Flight, Leg, free_run
 from towtank.trials.outcome import crossing, peak, trajectory
-from towtank.trials.pilot.helm import Helm
-from towtank.trials.pilot.law import Pilot
 from towtank.trials.trajectory import Trajectory
 
 LONGEST = 25.0

@@ -10,8 +10,8 @@ import numpy as np
 from towtank.errors import TowtankError
 from towtank.model.equations import Model
 from towtank.model.linear import elevator_reversal_speed, linearise
+from towtank.pilot.design import design_pilot, elevator_authority
 from towtank.provenance import provenance
-from towtank.trials.pilot.design import design_pilot, elevator_authority
 from towtank.trials.start import ballasted, level_trim, slowest_level_speed
 from towtank.trials.trajectory import Trajectory
 from towtank.verdict.criteria import SAMPLES, PlaneCriteria, index, plane_criteria, samples

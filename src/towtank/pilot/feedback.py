@@ -9,7 +9,7 @@ from scipy.linalg import LinAlgError, solve_continuous_are, solve_continuous_lya
 from scipy.optimize import brentq, minimize
 
 from towtank.frames import Array
-from towtank.trials.pilot.plant import Plant
+from towtank.pilot.plant import Plant
 
 
 @dataclass(frozen=True)

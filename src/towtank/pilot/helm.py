@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import Protocol
 
-from towtank.trials.pilot.allocation import (
+from towtank.pilot.allocation import (
     ELEVATOR_FIRST,
     RUDDER_FIRST,
     YAW_AND_PITCH_FIRST,
@@ -15,14 +15,14 @@ from towtank.trials.pilot.allocation import (
     Command,
     Order,
 )
-from towtank.trials.pilot.law import Pilot, wrapped
+from towtank.pilot.law import Pilot, wrapped
 
 EXTRA = 3
 """States of the helm beside the craft's: trim of the rudder, trim of the elevator, integral of the guidance."""
 
 
 class Guidance(Protocol):
-    """Where to head. Implemented by the line of sight in ``trials.guidance``."""
+    """Where to head. Implemented by the line of sight in ``pilot.guidance``."""
 
     def heading(self, north: float, east: float, integral: float) -> tuple[float, float]:
         """Heading wanted [rad] and rate of the guidance integral, at a position [m] and an integral."""

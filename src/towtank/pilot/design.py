@@ -10,9 +10,9 @@ from towtank.errors import InputError, TrialError
 from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.model.linear import LinearModel, elevator_reversal_speed, linearise
-from towtank.trials.pilot.feedback import Weights, closed_loop, margins, output_feedback
-from towtank.trials.pilot.law import Pilot
-from towtank.trials.pilot.plant import Plant, block, with_integral, with_servo
+from towtank.pilot.feedback import Weights, closed_loop, margins, output_feedback
+from towtank.pilot.law import Pilot
+from towtank.pilot.plant import Plant, block, with_integral, with_servo
 
 HEADING_ERROR = np.radians(20.0)
 PITCH_ERROR = np.radians(10.0)

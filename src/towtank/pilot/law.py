@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi, sin
 
-from towtank.trials.pilot.allocation import Command
+from towtank.pilot.allocation import Command
 
 SLOWEST = 0.3
 """Smallest fraction of the design speed at which the schedule still raises the gains; 1/0.3^2 is a factor of 11."""
