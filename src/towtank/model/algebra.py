@@ -26,7 +26,7 @@ ZERO = 0
 
 
 class Ops(Protocol):
-    """The elementary functions the equations need. ``numpy`` and ``casadi`` have them under these names."""
+    """The elementary functions the equations need, for one kind of number."""
 
     @property
     def sin(self) -> Callable[[Scalar], Scalar]:
@@ -56,14 +56,45 @@ class Ops(Protocol):
     def atan2(self) -> Callable[[Scalar, Scalar], Scalar]:
         """Angle of the point (second, first)."""
 
+    @property
+    def floor(self) -> Callable[[Scalar], Scalar]:
+        """Largest whole number that is not larger."""
+
+    @property
+    def positive(self) -> Callable[[Scalar], Scalar]:
+        """1.0 where the argument is larger than zero, else 0.0."""
+
 
 MATH: Ops = cast(
     Ops,
-    SimpleNamespace(sin=math.sin, cos=math.cos, fabs=math.fabs, sqrt=math.sqrt, fmin=min, fmax=max, atan2=math.atan2),
+    SimpleNamespace(
+        sin=math.sin,
+        cos=math.cos,
+        fabs=math.fabs,
+        sqrt=math.sqrt,
+        fmin=min,
+        fmax=max,
+        atan2=math.atan2,
+        floor=lambda x: float(math.floor(x)),
+        positive=lambda x: 1.0 if x > 0.0 else 0.0,
+    ),
 )
 """Functions of floats."""
 
-NUMPY: Ops = cast(Ops, np)
+NUMPY: Ops = cast(
+    Ops,
+    SimpleNamespace(
+        sin=np.sin,
+        cos=np.cos,
+        fabs=np.fabs,
+        sqrt=np.sqrt,
+        fmin=np.fmin,
+        fmax=np.fmax,
+        atan2=np.arctan2,
+        floor=np.floor,
+        positive=lambda x: np.asarray(np.greater(x, 0.0), dtype=float),
+    ),
+)
 """Functions of arrays."""
 
 
