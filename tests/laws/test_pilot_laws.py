@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 import synthetic_craft as synthetic
 from towtank.errors import InputError, TrialError
+from towtank.model.algebra import MATH
 from towtank.model.linear import horizontal
-from towtank.pilot.allocation import RUDDER_FIRST, allocation
+from towtank.pilot.allocation import RUDDER_FIRST, YAW_AND_PITCH_FIRST, allocation, share
 from towtank.pilot.design import design_pilot
 from towtank.pilot.effort import effort
 from towtank.pilot.law import wrapped
@@ -69,10 +70,10 @@ def test_eigenvalues_of_the_design_are_those_of_the_flying_law():
 
 @given(rudder=st.floats(-1.0, 1.0), elevator=st.floats(-1.0, 1.0), aileron=st.floats(-1.0, 1.0), first=st.booleans())
 def test_no_fin_is_asked_beyond_its_limit_and_yaw_and_pitch_keep_their_ratio(rudder, elevator, aileron, first):
-    share = allocation(synthetic.craft())
-    order = RUDDER_FIRST if first else ((0, 1), (2,))
-    granted = share((rudder, elevator, aileron), order)
-    assert max(abs(a) for a in share.fins(granted)) <= np.radians(25.0) * (1.0 + 1e-12)
+    fins = allocation(synthetic.craft())
+    order = RUDDER_FIRST if first else YAW_AND_PITCH_FIRST
+    granted = share((rudder, elevator, aileron), fins.rows, fins.limits, order, MATH)
+    assert max(abs(a) for a in fins.fins(granted)) <= np.radians(25.0) * (1.0 + 1e-12)
     if not first:
         assert granted[0] * elevator == pytest.approx(granted[1] * rudder, abs=1e-12)
     else:
@@ -85,8 +86,8 @@ def test_no_fin_is_asked_beyond_its_limit_and_yaw_and_pitch_keep_their_ratio(rud
 
 @given(st.floats(-50.0, 50.0))
 def test_heading_errors_take_the_short_way(angle):
-    assert -np.pi <= wrapped(angle) <= np.pi
-    assert np.cos(wrapped(angle)) == pytest.approx(np.cos(angle), abs=1e-9)
+    assert -np.pi <= wrapped(angle, MATH) <= np.pi
+    assert np.cos(wrapped(angle, MATH)) == pytest.approx(np.cos(angle), abs=1e-9)
 
 
 def test_fins_never_exceed_limit_nor_rate(unstable):

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from towtank.craft.craft import Craft
+from towtank.model.algebra import Matrix, Ops, Scalar, Vector, product
 
-Command = tuple[float, float, float]
-"""Virtual rudder, elevator, aileron [rad]."""
+First = tuple[Scalar, Scalar]
+"""1 for each of rudder and elevator that is served in the first stage, 0 if it is served in the second."""
 
-Order = tuple[tuple[int, ...], ...]
-"""Columns of the command (0 rudder, 1 elevator, 2 aileron) in groups, the first served first."""
+YAW_AND_PITCH_FIRST: First = (1.0, 1.0)
+RUDDER_FIRST: First = (1.0, 0.0)
+ELEVATOR_FIRST: First = (0.0, 1.0)
 
-YAW_AND_PITCH_FIRST: Order = ((0, 1), (2,))
-RUDDER_FIRST: Order = ((0,), (1,), (2,))
-ELEVATOR_FIRST: Order = ((1,), (0,), (2,))
+ROUND_OFF = 1e-12
+"""Angle [rad] below which a fin is not moved. The mixing of a fin at 90 deg holds entries such as 6e-17, and sums of
+columns are off by some 1e-16 rad; neither may count as a demand. A limit may be passed by as much."""
 
 
 @dataclass(frozen=True)
@@ -27,38 +30,49 @@ class Allocation:
     rows: tuple[tuple[float, ...], ...]
     limits: tuple[float, ...]
 
-    def __call__(self, command: Command, order: Order = YAW_AND_PITCH_FIRST) -> Command:
-        """The part of ``command`` [rad] that keeps every fin within its limit.
-
-        Groups of columns are served in ``order``; a group that asks for more than is left is scaled down as a whole,
-        so that its direction is kept. With the default order roll gets what yaw and pitch leave over.
-
-        Source     Allocator of the LAUV: yaw and pitch first, roll from the rest (THEORY section 5).
-        """
-        if all(abs(angle) <= limit for angle, limit in zip(self.fins(command), self.limits, strict=True)):
-            return command
-        granted = [0.0, 0.0, 0.0]
-        used = [0.0] * len(self.limits)
-        for group in order:
-            asked = [sum(row[i] * command[i] for i in group) for row in self.rows]
-            share = 1.0
-            for want, have, limit in zip(asked, used, self.limits, strict=True):
-                total = have + share * want
-                if want != 0.0 and abs(total) > limit:
-                    room = max(limit - have, 0.0) if total > 0.0 else max(limit + have, 0.0)
-                    share = min(share, room / abs(want))
-            for i in group:
-                granted[i] = share * command[i]
-            used = [have + share * want for have, want in zip(used, asked, strict=True)]
-        return granted[0], granted[1], granted[2]
-
-    def fins(self, command: Command) -> list[float]:
-        """Fin angles (n,) [rad] of ``command``."""
-        dr, de, da = command
-        return [a * dr + b * de + c * da for a, b, c in self.rows]
+    def fins(self, command: Sequence[float]) -> list[float]:
+        """Fin angles (n,) [rad] of ``command`` (3,): rudder, elevator, aileron [rad]."""
+        return product(self.rows, command)
 
 
 def allocation(craft: Craft) -> Allocation:
     """Allocation of a craft's fins."""
     rows = tuple((float(a), float(b), float(c)) for a, b, c in craft.mixing)
     return Allocation(rows, tuple(float(fin.max_angle) for fin in craft.fins))
+
+
+def share(command: Vector, rows: Matrix, limits: Vector, first: First, ops: Ops) -> list[Scalar]:
+    """The part (3,) of ``command`` [rad] that keeps every fin within its limit.
+
+    Three stages: the columns of yaw and pitch named by ``first``, the rest of yaw and pitch, roll. A stage that asks
+    for more than the earlier ones left is scaled down as a whole, so that its direction is kept. With both first,
+    roll gets what yaw and pitch leave over.
+
+    Parameters
+    ----------
+    command (3,) : rudder, elevator, aileron [rad].   rows (n, 3).   limits (n,) [rad].   first : 0 or 1 each.
+
+    Source     Allocator of the LAUV: yaw and pitch first, roll from the rest (THEORY section 5).
+    Departure  A stage is measured without those after it. A command whose later columns would bring a fin back within
+               its limit is reduced all the same.
+    """
+    rudder, elevator, aileron = command
+    early = [first[0] * rudder, first[1] * elevator]
+    late = [rudder - early[0], elevator - early[1]]
+    used: list[Scalar] = [0.0] * len(limits)
+    k1, used = _stage([row[0] * early[0] + row[1] * early[1] for row in rows], used, limits, ops)
+    k2, used = _stage([row[0] * late[0] + row[1] * late[1] for row in rows], used, limits, ops)
+    k3, used = _stage([row[2] * aileron for row in rows], used, limits, ops)
+    return [k1 * early[0] + k2 * late[0], k1 * early[1] + k2 * late[1], k3 * aileron]
+
+
+def _stage(asked: Vector, used: Vector, limits: Vector, ops: Ops) -> tuple[Scalar, list[Scalar]]:
+    """Share 0..1 of ``asked`` (n,) that fits beside ``used`` (n,), and what is used then (n,) [rad]."""
+    part: Scalar = 1.0
+    for want, have, limit in zip(asked, used, limits, strict=True):
+        size = ops.fabs(want)
+        room = ops.fmax(limit - (2.0 * ops.positive(want) - 1.0) * have, 0.0)
+        # Twice the whole where nothing is asked, so that neither a full fin nor a tie with 1 decides the stage.
+        idle = 2.0 - 2.0 * ops.positive(size - ROUND_OFF)
+        part = ops.fmin(part, room / ops.fmax(size, ROUND_OFF) + idle)
+    return part, [have + part * want for want, have in zip(asked, used, strict=True)]

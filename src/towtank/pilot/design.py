@@ -68,6 +68,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
     k_q, k_theta = pitch[2]
     order = _pitch_order(pitch)
     k_h, k_z, k_zi = depth[2][2:] / order
+    reversal = elevator_reversal_speed(model, "wide") or 0.0
     loops: dict[str, Loop] = {"heading": heading, "depth": depth, "roll": roll}
     return Pilot(
         craft=model.craft.name,
@@ -88,7 +89,8 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
         unwind=2.0 * length / speed,
         heading_band=float(HEADING_ERROR * BAND_SHARE),
         depth_band=float(DEPTH_ERROR * length * BAND_SHARE),
-        reversal=elevator_reversal_speed(model, "wide") or 0.0,
+        # A pilot designed below the inversion speed is designed for the reversed elevator: nothing to hold back.
+        reversal=reversal if reversal < speed else 0.0,
         eigenvalues={name: tuple(complex(s) for s in closed_loop(*loop)) for name, loop in loops.items()},
         margins={
             "heading": margins(*heading),

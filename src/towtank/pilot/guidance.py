@@ -1,52 +1,54 @@
-"""Line of sight: the heading that brings a craft onto a straight leg and keeps it there in a current."""
+"""Line of sight: the heading that brings a craft onto a straight leg and keeps it there in a current.
+
+``orders`` is ``Orders`` or any object with its attributes, of floats, arrays or symbols.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import atan, atan2, cos, hypot, sin
+from math import atan2
+from typing import Any
+
+from towtank.model.algebra import Ops, Scalar
+
+Point = tuple[float, float]
+"""North and east [m]."""
 
 
-@dataclass(frozen=True)
-class LineOfSight:
-    """Follow the straight leg from ``start`` to ``end``, (north, east) [m] each.
+def line(start: Point, end: Point, lookahead: float, drift: float = 0.0, crab: float = 0.0) -> dict[str, float]:
+    """The entries of ``Orders`` that make a craft follow the leg from ``start`` to ``end``.
 
-    lookahead [m] : distance ahead at which the craft aims for the leg.   gain [1/m] : of the integral that takes out
-    the drift that is left.   crab [rad] : angle between course and heading that a known cross current asks for.
+    lookahead [m]; drift [1/s], gain of the guidance integral; crab [rad].
     """
+    course = atan2(end[1] - start[1], end[0] - start[0])
+    return {
+        "steer": 1.0, "track": 1.0, "north": start[0], "east": start[1], "course": course,
+        "lookahead": lookahead, "drift": drift, "crab": crab,
+    }  # fmt: skip
 
-    start: tuple[float, float]
-    end: tuple[float, float]
-    lookahead: float
-    gain: float
-    crab: float = 0.0
 
-    @property
-    def course(self) -> float:
-        """Course of the leg [rad]."""
-        return atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
+def along(orders: Any, x: Scalar, y: Scalar, ops: Ops) -> Scalar:
+    """Distance made good along the leg [m] at north ``x`` and east ``y`` [m]."""
+    return (x - orders.north) * ops.cos(orders.course) + (y - orders.east) * ops.sin(orders.course)
 
-    @property
-    def length(self) -> float:
-        """Length of the leg [m]."""
-        return hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
 
-    def along_and_across(self, north: float, east: float) -> tuple[float, float]:
-        """Distance made good along the leg and distance off it to starboard [m]."""
-        x, y, a = north - self.start[0], east - self.start[1], self.course
-        return x * cos(a) + y * sin(a), y * cos(a) - x * sin(a)
+def across(orders: Any, x: Scalar, y: Scalar, ops: Ops) -> Scalar:
+    """Distance off the leg to starboard [m] at north ``x`` and east ``y`` [m]."""
+    return (y - orders.east) * ops.cos(orders.course) - (x - orders.north) * ops.sin(orders.course)
 
-    def heading(self, north: float, east: float, integral: float) -> tuple[float, float]:
-        """Heading wanted [rad] and the rate of the integral [m/s per unit speed] at a position.
 
-        psi = course - crab - atan((y + integral) / lookahead)
-        rate = gain lookahead^2 y / (lookahead^2 + (y + integral)^2)
+def line_of_sight(orders: Any, x: Scalar, y: Scalar, integral: Scalar, ops: Ops) -> tuple[Scalar, Scalar]:
+    """Heading wanted [rad] and rate of the guidance integral [m/s], at north ``x``, east ``y`` and ``integral`` [m].
 
-        Source     fossen2021, ch. 12, integral line-of-sight guidance.
-        Departure  The crab angle stands beside the integral. The integral is kept in metres of offset, so that it can
-                   be read as the drift it balances; the mission scales its gain with the speed.
-        Valid      Currents below the speed of the craft.
-        """
-        _, y = self.along_and_across(north, east)
-        aim = y + integral
-        square = self.lookahead * self.lookahead
-        return self.course - self.crab - atan(aim / self.lookahead), self.gain * square * y / (square + aim * aim)
+    psi = course - crab - atan((e + integral) / lookahead),   e : distance off the leg to starboard
+    rate = drift lookahead^2 e / (lookahead^2 + (e + integral)^2)
+
+    Source     fossen2021, ch. 12, integral line-of-sight guidance.
+    Departure  The crab angle stands beside the integral. The integral is kept in metres of offset, so that it can be
+               read as the drift it balances; the one who orders the leg scales its gain with the speed.
+    Valid      Currents below the speed of the craft; lookahead > 0.
+    """
+    e = across(orders, x, y, ops)
+    aim = e + integral
+    square = orders.lookahead * orders.lookahead
+    wanted = orders.course - orders.crab - ops.atan2(aim, orders.lookahead)
+    return wanted, orders.drift * square * e / (square + aim * aim)

@@ -1,31 +1,62 @@
-"""What moves the fins in a trial: fixed angles, the pilot, or a mixture."""
+"""What moves the fins in a trial: fixed angles, the pilot, or a mixture. An adaptor from a trial's words to orders."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, sin
-from typing import Protocol
+from functools import cached_property
+from math import atan2, cos, hypot, sin
 
-from towtank.pilot.allocation import (
-    ELEVATOR_FIRST,
-    RUDDER_FIRST,
-    YAW_AND_PITCH_FIRST,
-    Allocation,
-    Command,
-    Order,
-)
-from towtank.pilot.law import Pilot, wrapped
+from towtank.model.algebra import MATH
+from towtank.pilot.allocation import Allocation
+from towtank.pilot.guidance import across, along, line, line_of_sight
+from towtank.pilot.law import MEMORY, NO_PILOT, Pilot, Seen, steer
+from towtank.pilot.orders import Orders
 
-EXTRA = 3
+EXTRA = MEMORY
 """States of the helm beside the craft's: trim of the rudder, trim of the elevator, integral of the guidance."""
 
+Command = tuple[float, float, float]
+"""Virtual rudder, elevator, aileron [rad]."""
 
-class Guidance(Protocol):
-    """Where to head. Implemented by the line of sight in ``pilot.guidance``."""
 
-    def heading(self, north: float, east: float, integral: float) -> tuple[float, float]:
-        """Heading wanted [rad] and rate of the guidance integral, at a position [m] and an integral."""
+@dataclass(frozen=True)
+class LineOfSight:
+    """Follow the straight leg from ``start`` to ``end``, (north, east) [m] each.
+
+    lookahead [m] : distance ahead at which the craft aims for the leg.   gain [1/s] : of the integral that takes out
+    the drift that is left.   crab [rad] : angle between course and heading that a known cross current asks for.
+    """
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    lookahead: float
+    gain: float
+    crab: float = 0.0
+
+    @property
+    def course(self) -> float:
+        """Course of the leg [rad]."""
+        return atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
+
+    @property
+    def length(self) -> float:
+        """Length of the leg [m]."""
+        return hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
+
+    @property
+    def entries(self) -> dict[str, float]:
+        """The entries of ``Orders`` for this leg."""
+        return line(self.start, self.end, self.lookahead, self.gain, self.crab)
+
+    @cached_property
+    def orders(self) -> Orders:
+        """Orders that hold this leg and nothing else."""
+        return Orders(**self.entries)
+
+    def along_and_across(self, north: float, east: float) -> tuple[float, float]:
+        """Distance made good along the leg and distance off it to starboard [m]."""
+        return along(self.orders, north, east, MATH), across(self.orders, north, east, MATH)
 
 
 @dataclass(frozen=True)
@@ -43,15 +74,26 @@ class Helm:
     elevator: float = 0.0
     heading: float | None = None
     depth: float | None = None
-    guidance: Guidance | None = None
+    guidance: LineOfSight | None = None
     damp_roll: bool = True
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def wanted_heading(self, state: Sequence[float], integral: float) -> tuple[float | None, float]:
-        """Heading wanted [rad] or None, and the rate of the guidance integral."""
+    @cached_property
+    def orders(self) -> Orders:
+        """The same commands as numbers."""
+        track = self.guidance.entries if self.guidance else {}
+        steered = {} if self.heading is None or self.guidance else {"steer": 1.0, "heading": self.heading}
+        dived = {} if self.depth is None else {"dive": 1.0, "depth": self.depth}
+        return Orders(
+            piloted=0.0 if self.pilot is None else 1.0, rudder=self.rudder, elevator=self.elevator,
+            damp_roll=float(self.damp_roll), **track, **steered, **dived,
+        )  # fmt: skip
+
+    def wanted_heading(self, state: Sequence[float], integral: float) -> float | None:
+        """Heading wanted [rad], or None where none is ordered."""
         if self.guidance is None:
-            return self.heading, 0.0
-        return self.guidance.heading(state[0], state[1], integral)
+            return self.heading
+        return float(line_of_sight(self.orders, state[0], state[1], integral, MATH)[0])
 
     def water_speed(self, state: Sequence[float]) -> float:
         """Speed ahead through the water [m/s], for the pilot's schedule: what a log shows."""
@@ -61,29 +103,13 @@ class Helm:
 
     def order(self, state: Sequence[float], extra: Sequence[float]) -> tuple[Command, tuple[float, float, float]]:
         """Granted virtual command [rad] and rates of the helm's own states, for the craft's ``state`` (12 + n)."""
-        pilot = self.pilot
-        if pilot is None:
-            return self.allocation((self.rudder, self.elevator, 0.0), RUDDER_FIRST), (0.0, 0.0, 0.0)
-        heading, guiding = self.wanted_heading(state, extra[2])
-        falling = sinking(state)
-        state = [*state[:6], self.water_speed(state), *state[7:]]
-        rudder, elevator, held = self.rudder, self.elevator, [True, True]
-        errors = [0.0, 0.0]
-        priority: Order = YAW_AND_PITCH_FIRST
-        if heading is not None:
-            rudder, held[0] = pilot.rudder(state, heading, extra[0])
-            errors[0] = wrapped(heading - state[5])
-        else:
-            priority = RUDDER_FIRST
-        if self.depth is not None:
-            elevator, held[1] = pilot.elevator(state, falling, self.depth, extra[1])
-            errors[1] = self.depth - state[2]
-        elif heading is not None:
-            priority = ELEVATOR_FIRST
-        asked = (rudder, elevator, pilot.aileron(state) if self.damp_roll else 0.0)
-        granted = self.allocation(asked, priority)
-        rates = pilot.trim_rates((errors[0], errors[1]), (held[0], held[1]), (extra[0], extra[1]), asked, granted)
-        return granted, (*rates, guiding)
+        x, y, z, phi, theta, psi = state[:6]
+        p, q, r = state[9:12]
+        seen = Seen(x, y, z, phi, theta, psi, self.water_speed(state), p, q, r, sinking(state))
+        a = self.allocation
+        out = steer(self.pilot or NO_PILOT, a.rows, a.limits, self.orders, seen, extra, MATH)
+        (rudder, elevator, aileron), (r1, r2, r3) = out.granted, out.memory_rates
+        return (rudder, elevator, aileron), (r1, r2, r3)
 
 
 def sinking(state: Sequence[float]) -> float:

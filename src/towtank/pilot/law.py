@@ -1,15 +1,26 @@
-"""The pilot as a continuous law: heading and depth cascade, roll damping, limits, anti-windup, schedule with speed."""
+"""The pilot as a law without branches: heading and depth cascade, roll damping, limits, anti-windup, schedule.
+
+One text for floats, arrays and symbols. A choice is a factor 0 or 1. ``pilot``, ``orders`` and ``seen`` may be any
+objects with the attributes named in ``GAINS``, ``ORDERS`` and ``Seen``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from math import pi, sin
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from math import pi
+from typing import Any, NamedTuple
 
-from towtank.pilot.allocation import Command
+from towtank.model.algebra import Matrix, Ops, Scalar, Vector
+from towtank.pilot.allocation import ROUND_OFF, share
+from towtank.pilot.guidance import line_of_sight
 
 SLOWEST = 0.3
 """Smallest fraction of the design speed at which the schedule still raises the gains; 1/0.3^2 is a factor of 11."""
+MEMORY = 3
+"""States of the pilot: trim of the rudder [rad], trim of the elevator [rad], integral of the guidance [m]."""
+_STANDSTILL = 1e-9
+"""Speed [m/s] that stands for zero where a speed is a divisor."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +38,7 @@ class Pilot:
     depth [rad/m], depth_rate [rad s/m], depth_integral [rad/(m s)], pitch_limit [rad], roll [-], roll_rate [s].
     unwind [s] : time in which a saturated fin takes back what its trim cannot use.
     heading_band [rad], depth_band [m] : largest errors the trims integrate, so that a large step does not fill them.
-    reversal [m/s] : speed below which the elevator acts reversed on depth, 0 if none.
+    reversal [m/s] : speed below which the elevator acts reversed on depth; 0 if there is none below ``speed``.
     eigenvalues : loop -> closed-loop eigenvalues [1/s].   margins : loop -> (largest gain factor, smallest gain factor,
     phase margin [rad]).   notes : what the pilot cannot do, in words.
     """
@@ -55,73 +66,149 @@ class Pilot:
     margins: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def schedule(self, u: float) -> float:
-        """(speed / u)^2 with u [m/s] not below ``SLOWEST`` times the design speed."""
-        ratio = self.speed / max(u, SLOWEST * self.speed)
-        return ratio * ratio
 
-    def authority(self, u: float) -> float:
-        """Share of the depth order that is followed at ``u`` [m/s].
+GAINS: tuple[str, ...] = tuple(
+    f.name for f in fields(Pilot) if f.name not in {"craft", "eigenvalues", "margins", "notes"}
+)
+"""Names of the numbers the law uses, ``speed`` to ``reversal``, in the order in which they are packed."""
 
-        It is 0 at the elevator's inversion speed and 1 from 1.05 times it on. A craft slowed down by a turn would
-        otherwise be steered the wrong way in depth.
-        """
-        if self.reversal <= 0.0 or self.reversal >= self.speed:
-            return 1.0
-        return max(0.0, min(1.0, 20.0 * (u / self.reversal - 1.0)))
-
-    def rudder(self, state: Sequence[float], heading: float, trim: float) -> tuple[float, bool]:
-        """Rudder asked for [rad], and whether the turn is at its limit."""
-        turn = self.heading * wrapped(heading - state[5])
-        limited = abs(turn) > self.turn_limit
-        turn = max(-self.turn_limit, min(self.turn_limit, turn))
-        return -self.schedule(state[6]) * self.yaw_rate * (state[11] - turn) + trim, limited
-
-    def elevator(self, state: Sequence[float], rate: float, depth: float, trim: float) -> tuple[float, bool]:
-        """Elevator asked for [rad], and whether the pitch is at its limit; ``rate`` is zdot [m/s]."""
-        pitch = self.authority(state[6]) * (self.depth_rate * rate - self.depth * (depth - state[2]))
-        limited = abs(pitch) > self.pitch_limit or self.authority(state[6]) < 1.0
-        pitch = max(-self.pitch_limit, min(self.pitch_limit, pitch))
-        asked = self.pitch_rate * state[10] + self.pitch * state[4] - self.pitch_order * pitch
-        return -self.schedule(state[6]) * asked + trim, limited
-
-    def aileron(self, state: Sequence[float]) -> float:
-        """Aileron asked for [rad]."""
-        return -self.schedule(state[6]) * (self.roll * sin(state[3]) + self.roll_rate * state[9])
-
-    def trim_rates(
-        self,
-        errors: tuple[float, float],
-        limited: tuple[bool, bool],
-        trims: tuple[float, float],
-        asked: Command,
-        granted: Command,
-    ) -> tuple[float, float]:
-        """Rates [rad/s] of the rudder's and the elevator's trim.
-
-        errors : of heading [rad] and depth [m]. While a reference is at its limit the trim is held. While a fin is at
-        its limit the trim moves back only, and loses in ``unwind`` seconds what it adds beyond the limit.
-
-        Source     fossen2021, ch. 15, integrator anti-windup by back-calculation.
-        Departure  Back-calculation takes off no more than the trim itself has added, so that a large step does not
-                   spoil the trim.
-        """
-        gains = (self.heading_integral, self.depth_integral)
-        bands = (self.heading_band, self.depth_band)
-        out = []
-        for gain, band, error, held, trim, want, got in zip(
-            gains, bands, errors, limited, trims, asked, granted, strict=False
-        ):
-            rate = 0.0 if held else gain * max(-band, min(band, error))
-            excess = want - got
-            if excess != 0.0:
-                rate = rate if rate * excess < 0.0 else 0.0
-                if not held and excess * trim > 0.0:
-                    rate -= (excess if abs(excess) < abs(trim) else trim) / self.unwind
-            out.append(rate)
-        return out[0], out[1]
+NO_PILOT = Pilot(craft="", speed=1.0)
+"""Stands for the pilot of a run that has none; its orders have ``piloted`` 0."""
 
 
-def wrapped(angle: float) -> float:
-    """``angle`` [rad] brought to -pi..pi."""
-    return (angle + pi) % (2.0 * pi) - pi
+class Seen(NamedTuple):
+    """What a pilot measures.
+
+    x, y, z [m]; phi, theta, psi [rad]; u : speed ahead through the water [m/s]; p, q, r [rad/s]; sink : zdot [m/s].
+    """
+
+    x: Scalar
+    y: Scalar
+    z: Scalar
+    phi: Scalar
+    theta: Scalar
+    psi: Scalar
+    u: Scalar
+    p: Scalar
+    q: Scalar
+    r: Scalar
+    sink: Scalar
+
+
+class Steering(NamedTuple):
+    """granted (3,) : virtual rudder, elevator, aileron [rad] within the fins' limits.
+
+    memory_rates (3,) : of the trims [rad/s] and the guidance integral [m/s].   heading : wanted [rad], psi where none
+    is ordered.
+    """
+
+    granted: list[Scalar]
+    memory_rates: list[Scalar]
+    heading: Scalar
+
+
+def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memory: Vector, ops: Ops) -> Steering:
+    """Command of the pilot under ``orders``.
+
+    Without a pilot (``orders.piloted`` 0) the command is the ordered rudder and elevator, rudder first, and the memory
+    stands still. What is open loop is served before what the pilot adds.
+
+    Parameters
+    ----------
+    pilot : gains, see ``GAINS``.   rows (n, 3), limits (n,) [rad] : of the fins.   orders : see ``Orders``.
+    seen : see ``Seen``.   memory (3,) : trims of rudder and elevator [rad], integral of the guidance [m].
+
+    Source     perron (heading and depth from rudder and elevator); cascade of the LAUV (THEORY section 7).
+    """
+    steering = orders.piloted * ops.fmax(orders.steer, orders.track)
+    diving = orders.piloted * orders.dive
+    sight, drifting = line_of_sight(orders, seen.x, seen.y, memory[2], ops)
+    wanted = _choose(steering, _choose(orders.track, sight, orders.heading), seen.psi)
+    off = wrapped(wanted - seen.psi, ops)
+    deep = orders.depth - seen.z
+    s = schedule(pilot, seen.u, ops)
+    rudder, turning = _rudder(pilot, s, off, seen, memory[0], ops)
+    elevator, pitching = _elevator(pilot, s, deep, seen, memory[1], ops)
+    aileron = -s * (pilot.roll * ops.sin(seen.phi) + pilot.roll_rate * seen.p)
+    asked = [
+        _choose(steering, rudder, orders.rudder),
+        _choose(diving, elevator, orders.elevator),
+        orders.piloted * orders.damp_roll * aileron,
+    ]
+    granted = share(asked, rows, limits, (1.0 - steering * (1.0 - diving), steering), ops)
+    over = [want - got for want, got in zip(asked, granted, strict=True)]
+    to_heading = pilot.heading_integral * clamp(off, pilot.heading_band, ops)
+    to_depth = pilot.depth_integral * clamp(deep, pilot.depth_band, ops)
+    rates = [
+        _trim_rate(to_heading, steering * turning, memory[0], over[0], pilot.unwind, ops),
+        _trim_rate(to_depth, diving * pitching, memory[1], over[1], pilot.unwind, ops),
+        orders.piloted * orders.track * drifting,
+    ]
+    return Steering(granted, rates, wanted)
+
+
+def schedule(pilot: Any, u: Scalar, ops: Ops) -> Scalar:
+    """(speed / u)^2 with u [m/s] not below ``SLOWEST`` times the design speed."""
+    ratio = pilot.speed / ops.fmax(u, SLOWEST * pilot.speed)
+    return ratio * ratio
+
+
+def authority(pilot: Any, u: Scalar, ops: Ops) -> Scalar:
+    """Share of the depth order that is followed at ``u`` [m/s]; 1 where the elevator has no inversion speed.
+
+    It is 0 at the elevator's inversion speed and 1 from 1.05 times it on. A craft slowed down by a turn would
+    otherwise be steered the wrong way in depth.
+    """
+    above = 20.0 * (u / ops.fmax(pilot.reversal, _STANDSTILL) - 1.0)
+    return ops.fmax(ops.fmin(ops.fmax(above, 0.0), 1.0), 1.0 - ops.positive(pilot.reversal))
+
+
+def wrapped(angle: Scalar, ops: Ops) -> Scalar:
+    """``angle`` [rad] brought to -pi..pi, up to round-off; an angle within is returned as it is."""
+    return angle - 2.0 * pi * ops.floor((angle + pi) / (2.0 * pi))
+
+
+def clamp(value: Scalar, largest: Scalar, ops: Ops) -> Scalar:
+    """``value`` brought to -largest..largest."""
+    return ops.fmax(ops.fmin(value, largest), -largest)
+
+
+def _choose(switch: Scalar, on: Scalar, off: Scalar) -> Scalar:
+    """``on`` where ``switch`` is 1, ``off`` where it is 0; both must be finite."""
+    return switch * on + (1.0 - switch) * off
+
+
+def _rudder(pilot: Any, s: Scalar, off: Scalar, seen: Any, trim: Scalar, ops: Ops) -> tuple[Scalar, Scalar]:
+    """Rudder asked for [rad] at a heading error ``off`` [rad]; 1 while the turn is within its limit, else 0."""
+    turn = pilot.heading * off
+    free = 1.0 - ops.positive(ops.fabs(turn) - pilot.turn_limit)
+    turn = clamp(turn, pilot.turn_limit, ops)
+    return -s * pilot.yaw_rate * (seen.r - turn) + trim, free
+
+
+def _elevator(pilot: Any, s: Scalar, deep: Scalar, seen: Any, trim: Scalar, ops: Ops) -> tuple[Scalar, Scalar]:
+    """Elevator asked for [rad] at a depth error ``deep`` [m]; 1 while the pitch is within its limit, else 0."""
+    followed = authority(pilot, seen.u, ops)
+    pitch = followed * (pilot.depth_rate * seen.sink - pilot.depth * deep)
+    free = (1.0 - ops.positive(ops.fabs(pitch) - pilot.pitch_limit)) * (1.0 - ops.positive(1.0 - followed))
+    pitch = clamp(pitch, pilot.pitch_limit, ops)
+    asked = pilot.pitch_rate * seen.q + pilot.pitch * seen.theta - pilot.pitch_order * pitch
+    return -s * asked + trim, free
+
+
+def _trim_rate(wanted: Scalar, free: Scalar, trim: Scalar, over: Scalar, unwind: Scalar, ops: Ops) -> Scalar:
+    """Rate of a trim [rad/s] from the rate ``wanted`` by its error and the command ``over`` the fins' limits [rad].
+
+    While a reference is at its limit (``free`` 0) the trim is held. While a fin is at its limit the trim moves back
+    only, and loses in ``unwind`` seconds what it adds beyond the limit. Up to ``ROUND_OFF`` beyond the limit counts as
+    within: the sharing of a command among fins is exact to some 1e-16 rad only.
+
+    Source     fossen2021, ch. 15, integrator anti-windup by back-calculation.
+    Departure  Back-calculation takes off no more than the trim itself has added, so that a large step does not spoil
+               the trim.
+    """
+    full = ops.positive(ops.fabs(over) - ROUND_OFF)
+    back = ops.positive(-wanted * over)
+    # The part of ``over`` that has the sign of the trim and is no larger than it.
+    added = ops.fmax(ops.fmin(over, trim), 0.0) + ops.fmin(ops.fmax(over, trim), 0.0)
+    return free * ((1.0 - full * (1.0 - back)) * wanted - full * added / unwind)

@@ -12,7 +12,7 @@ import numpy as np
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import STILL, Model
-from towtank.pilot.guidance import LineOfSight
+from towtank.pilot.helm import LineOfSight
 from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity, si
 from towtank.trials.integrate import Event, Flight, Leg, free_run

@@ -74,7 +74,7 @@ def _order(flight: Flight, i: int, fins: int) -> tuple[tuple[float, float, float
     helm = flight.legs[int(flight.leg[i])].helm
     row = flight.state[i].tolist()
     state, extra = row[: 12 + fins], row[12 + fins :]
-    heading, _ = helm.wanted_heading(state, extra[2])
+    heading = helm.wanted_heading(state, extra[2])
     depth = np.nan if helm.depth is None else helm.depth
     return helm.order(state, extra)[0], np.nan if heading is None else heading, depth
 

@@ -9,11 +9,12 @@ from scipy.optimize import root
 
 from towtank.errors import InputError
 from towtank.frames import Array
+from towtank.model.algebra import MATH
 from towtank.model.equations import Model
-from towtank.pilot.allocation import allocation
+from towtank.pilot.allocation import RUDDER_FIRST, allocation, share
 from towtank.pilot.design import design_pilot
 from towtank.pilot.helm import EXTRA, Helm
-from towtank.pilot.law import Pilot
+from towtank.pilot.law import Pilot, schedule
 from towtank.quantity import Quantity, si
 
 STEEPEST_TRIM = np.radians(30.0)
@@ -59,7 +60,8 @@ def level_trim(model: Model, speed: float) -> Trim:
     u, w, theta, de = found.x * scale
     if not found.success or u <= 0.2 * speed:
         return replace(let_go, why=f"no level flight balances the weight residual at {speed:g} m/s")
-    largest = allocation(model.craft)((0.0, float(de), 0.0))[1]
+    fins = allocation(model.craft)
+    largest = share((0.0, float(de), 0.0), fins.rows, fins.limits, RUDDER_FIRST, MATH)[1]
     if abs(largest) < 0.999 * abs(de) or abs(theta) > STEEPEST_TRIM:
         return replace(
             let_go,
@@ -135,7 +137,7 @@ def setting(model: Model, speed: Quantity | None, pilot: Pilot | None = None, *,
     extra = [0.0] * EXTRA
     if pilot is not None:
         # The elevator's trim carries what the pitch feedback asks for in level flight: the pilot starts at rest.
-        extra[1] = trim.elevator + pilot.schedule(trim.u) * pilot.pitch * trim.pitch
+        extra[1] = trim.elevator + schedule(pilot, trim.u, MATH) * pilot.pitch * trim.pitch
     state = [0.0, 0.0, 0.0, 0.0, trim.pitch, 0.0, trim.u, 0.0, trim.w, 0.0, 0.0, 0.0, *fins, *extra]
     helm = Helm(allocation(model.craft), pilot, elevator=trim.elevator)
     return Setting(U, trim, np.array(state), helm, float(model.thrust(U)), model.craft.length / U)

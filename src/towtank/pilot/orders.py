@@ -1,0 +1,39 @@
+"""What a pilot is asked to do during one leg: numbers only, so that a leg is a row of floats to the engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Orders of one leg. The defaults are "nothing ordered, no pilot". Switches are 0.0 or 1.0, used as factors.
+
+    piloted : 1 when a pilot flies; at 0 every other switch is without effect.
+    rudder, elevator [rad] : virtual angles used where the pilot has no order.
+    steer : 1 when a heading is followed.   heading [rad].
+    track : 1 when the line of sight to a leg gives the heading; it steers whether ``steer`` is set or not.
+    north, east [m] : start of the leg.   course [rad].   lookahead [m] : distance ahead at which the craft aims, > 0.
+    drift [1/s] : gain of the guidance integral.   crab [rad] : angle between course and heading in a known current.
+    dive : 1 when a depth is followed.   depth [m].   damp_roll : 1 when the pilot damps roll.
+    """
+
+    piloted: float = 0.0
+    rudder: float = 0.0
+    elevator: float = 0.0
+    steer: float = 0.0
+    heading: float = 0.0
+    track: float = 0.0
+    north: float = 0.0
+    east: float = 0.0
+    course: float = 0.0
+    lookahead: float = 1.0
+    drift: float = 0.0
+    crab: float = 0.0
+    dive: float = 0.0
+    depth: float = 0.0
+    damp_roll: float = 1.0
+
+
+ORDERS: tuple[str, ...] = tuple(field.name for field in fields(Orders))
+"""Names of the orders, in the order in which they are packed."""
