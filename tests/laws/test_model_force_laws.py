@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from towtank.craft.craft import Propeller
 from towtank.errors import ArtefactError, CraftError, InputError
+from towtank.model.algebra import MATH, interpolate
 from towtank.model.equations import Model, ModelOptions
 from towtank.model.files import read_model, write_model
 from towtank.model.linear import elevator_reversal_speed, horizontal, linearise, stability_indices, vertical
@@ -179,7 +180,9 @@ def test_a_propeller_balances_the_resistance_at_its_speed_and_pulls_more_below()
 def test_a_propeller_table_that_ends_early_is_carried_on_straight_to_zero_thrust():
     short = Propeller(0.3, 4.9, table=((0.0, 0.4, 0.06), (0.1, 0.36, 0.055)))
     screw = model(propeller=short).constants.screw
-    assert (screw.advance[-1], screw.kt[-1], screw.kq[-1]) == pytest.approx((1.0, 0.0, 0.01))
+    end = screw.kt.knots[-1]
+    values = (end, *(interpolate(end, table, MATH) for table in (screw.kt, screw.kq)))
+    assert values == pytest.approx((1.0, 0.0, 0.01), abs=1e-15)
     assert 0.1 < screw.balance < 1.0
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from operator import mul
 from types import SimpleNamespace
 from typing import Any, Protocol, cast
@@ -129,15 +130,30 @@ def product_transposed(matrix: Matrix, vector: Vector) -> list[Scalar]:
     return product([*zip(*matrix, strict=True)], vector)
 
 
-def interpolate(x: Scalar, knots: Sequence[float], values: Sequence[float], ops: Ops) -> Scalar:
-    """Piecewise-linear table, held constant beyond its ends; a sum of ramps, so it works on symbols too.
+@dataclass(frozen=True)
+class Table:
+    """A piecewise-linear table: ``knots`` (n,), the value at the first of them, and the ``slopes`` (n - 1,) between.
 
-    knots must rise; values is as long as knots.
+    With the slopes stored, nothing is divided where the table is used. A table may be carried on with its last knot
+    repeated and slopes of zero; its values stay the same.
     """
-    total: Scalar = values[0]
-    for i in range(len(knots) - 1):
-        slope = (values[i + 1] - values[i]) / (knots[i + 1] - knots[i])
-        total = total + slope * (ops.fmin(ops.fmax(x, knots[i]), knots[i + 1]) - knots[i])
+
+    knots: Sequence[Scalar]
+    first: Scalar
+    slopes: Sequence[Scalar]
+
+
+def table_of(knots: Sequence[float], values: Sequence[float]) -> Table:
+    """The table through ``values`` (n,) at ``knots`` (n,), which must rise."""
+    slopes = ((values[i + 1] - values[i]) / (knots[i + 1] - knots[i]) for i in range(len(knots) - 1))
+    return Table(tuple(knots), values[0], tuple(slopes))
+
+
+def interpolate(x: Scalar, table: Table, ops: Ops) -> Scalar:
+    """Value of ``table`` at ``x``, held constant beyond its ends; a sum of ramps, so it works on symbols too."""
+    total = table.first
+    for low, high, slope in zip(table.knots, table.knots[1:], table.slopes, strict=False):
+        total = total + slope * (ops.fmin(ops.fmax(x, low), high) - low)
     return total
 
 

@@ -15,7 +15,8 @@ from towtank.model.algebra import Ops
 class Dual:
     """A float ``value`` with its ``gradient`` (n,) with respect to n chosen variables.
 
-    The rules are the chain rule. ``abs`` has slope 0 at 0, which is exact for the products v|v| of the model.
+    The rules are the chain rule. ``abs`` has slope 0 at 0, which is exact for the products v|v| of the model. ``floor``
+    and ``positive`` are steps: their results are plain numbers, without a gradient.
     """
 
     __array_ufunc__ = None
@@ -109,5 +110,26 @@ def _atan2(y: Any, x: Any) -> Any:
     return Dual(angle, (x.value * y.gradient - y.value * x.gradient) / square)
 
 
-DUAL: Ops = cast(Ops, SimpleNamespace(sin=_sin, cos=_cos, fabs=_fabs, sqrt=_sqrt, fmin=_fmin, fmax=_fmax, atan2=_atan2))
+def _floor(x: Any) -> float:
+    return float(math.floor(_number(x)))
+
+
+def _positive(x: Any) -> float:
+    return 1.0 if _number(x) > 0.0 else 0.0
+
+
+DUAL: Ops = cast(
+    Ops,
+    SimpleNamespace(
+        sin=_sin,
+        cos=_cos,
+        fabs=_fabs,
+        sqrt=_sqrt,
+        fmin=_fmin,
+        fmax=_fmax,
+        atan2=_atan2,
+        floor=_floor,
+        positive=_positive,
+    ),
+)
 """Functions of dual numbers."""

@@ -11,19 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from towtank.craft.craft import Craft
-from towtank.craft.hydrostatics import hydrostatics
 from towtank.derive.table import Derivatives
 from towtank.errors import InputError
 from towtank.model.added_mass import added_mass_matrix, coriolis_full, coriolis_reduced
-from towtank.model.algebra import MATH, Matrix, Ops, Scalar, Vector, frozen, ops_for, product, product_transposed
+from towtank.model.algebra import Matrix, Ops, Scalar, Vector, frozen, ops_for, product, product_transposed
 from towtank.model.damping import damping_matrix
+from towtank.model.extra import ExtraLoad, check_extra, extra_load
 from towtank.model.fins import (
     FinSet,
     actuator_rates,
@@ -33,7 +34,7 @@ from towtank.model.fins import (
     fin_set,
     virtual_angles,
 )
-from towtank.model.kinematics import Trig, euler_matrix, rotation_matrix, trig_of
+from towtank.model.kinematics import euler_matrix, quaternion_matrix, quaternion_rates, rotation_matrix, trig_of
 from towtank.model.restoring import restoring_vector
 from towtank.model.rigid_body import Body, body_of, coriolis_matrix, mass_matrix
 from towtank.model.thrust import Screw, screw_of, steady_thrust, thrust_load
@@ -44,6 +45,9 @@ STATE = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r")
 """Position [m, NED], attitude [rad], velocity over ground in body axes [m/s, rad/s]; then one angle per fin [rad]."""
 
 STILL = (0.0, 0.0, 0.0)
+
+LEVEL = (0.0, 0.0, 1.0)
+"""Gravity in the body axes of a level craft."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +64,18 @@ class ModelOptions:
     axisymmetric_crossflow: bool = False
     centre_of_buoyancy: tuple[float, float, float] | None = None
 
+    @property
+    def straightened(self) -> bool:
+        """True unless both factors are the number zero; a symbol counts as a factor."""
+        return any(not isinstance(kappa, int | float) or kappa != 0.0 for kappa in (self.kappa_v, self.kappa_r))
+
 
 @dataclass(frozen=True)
 class Constants:
-    """Everything constant in the right-hand side.
+    """Everything constant in the right-hand side. Numbers may be floats, arrays or symbols.
 
+    body, c (derivatives by name), added (6, 6), fins, screw (None for constant thrust), extra : what the terms take.
+    split, options : which form the terms have.
     mass_inverse (6, 6) is (M_RB - M_A)^-1, taken once from an LU factorisation when the model is made: the matrix is
     constant, so a solve at every step would repeat the same work.
     """
@@ -77,37 +88,72 @@ class Constants:
     screw: Screw | None
     split: bool
     options: ModelOptions
+    extra: ExtraLoad | None = None
 
 
-def parts(k: Constants, nu: Vector, trig: Trig, delta: Vector, thrust: Scalar, ops: Ops) -> dict[str, list[Scalar]]:
-    """The terms of eq. 2.9, each a load (6,) on the body [N, N m]; nu (6,) through the water.
+def parts(k: Constants, nu: Vector, down: Vector, delta: Vector, thrust: Scalar, ops: Ops) -> dict[str, list[Scalar]]:
+    """The terms of eq. 2.9, each a load (6,) on the body [N, N m].
 
+    nu (6,) through the water; down (3,), the unit vector of gravity in body axes: the last row of J1; delta (n_fins,).
     They add up to (M_RB - M_A) nudot: "rigid body" -C_RB nu, "added mass" +C_A nu, "damping" +D nu, "restoring" -G,
-    "fins" and "thrust" (together tau).
+    "fins" and "thrust" (together tau); then "extra", the user's own load, if the model has one.
     """
     options = k.options
     coriolis = coriolis_full if k.split else coriolis_reduced
-    if options.kappa_v or options.kappa_r:
+    extra = {"extra": extra_load(k.extra, nu, down, delta, ops)} if k.extra else {}
+    if options.straightened:
         delta = effective_angles(k.fins, nu, delta, options.kappa_v, options.kappa_r, ops)
     force, torque = thrust_load(k.screw, thrust, nu[0], ops)
     return {
         "rigid body": [-x for x in product(coriolis_matrix(k.body, nu), nu)],
         "added mass": product(coriolis(k.added, nu), nu),
         "damping": product(damping_matrix(k.c, nu, ops, options.axisymmetric_crossflow), nu),
-        "restoring": [-x for x in restoring_vector(k.body, trig)],
+        "restoring": [-x for x in restoring_vector(k.body, down)],
         "fins": fin_load(k.c, k.fins, nu[0], delta, ops),
         "thrust": [force, 0.0, 0.0, torque, 0.0, 0.0],
+        **extra,
     }
 
 
-def acceleration(k: Constants, nu: Vector, trig: Trig, delta: Vector, thrust: Scalar, ops: Ops) -> list[Scalar]:
+def total_load(k: Constants, nu: Vector, down: Vector, delta: Vector, thrust: Scalar, ops: Ops) -> list[Scalar]:
+    """The bracket of eq. 2.9 (6,) [N, N m]: the sum of ``parts``, equal to (M_RB - M_A) nudot.
+
+    Source     perron, eq. 2.9.
+    """
+    return [reduce(add, row) for row in zip(*parts(k, nu, down, delta, thrust, ops).values(), strict=True)]
+
+
+def acceleration(k: Constants, nu: Vector, down: Vector, delta: Vector, thrust: Scalar, ops: Ops) -> list[Scalar]:
     """Acceleration (6,) relative to the water, in body axes.
 
     Source     perron, eq. 2.9.
     Departure  The inverse mass matrix stands on the left of the bracket; +D nu with natural derivatives.
     """
-    loads = parts(k, nu, trig, delta, thrust, ops).values()
-    return product(k.mass_inverse, [a + b + c + d + e + f for a, b, c, d, e, f in zip(*loads, strict=True)])
+    return product(k.mass_inverse, total_load(k, nu, down, delta, thrust, ops))
+
+
+def acceleration_over_ground(
+    k: Constants, J1: Matrix, nu: Vector, delta: Vector, thrust: Scalar, current: Vector, ops: Ops
+) -> list[Scalar]:
+    """Rates (6,) of the velocity over ground ``nu`` (6,), in body axes, of a body with the attitude J1 (3, 3).
+
+    ``acceleration`` gives the rate of the velocity through the water; a steady current (3,) [m/s, NED] seen from the
+    turning body adds -omega x v_c.
+
+    Source     fossen2021, ch. 10.
+    """
+    u, v, w, p, q, r = nu
+    u_c, v_c, w_c = product_transposed(J1, current)
+    water = [u - u_c, v - v_c, w - w_c, p, q, r]
+    udot, vdot, wdot, pdot, qdot, rdot = acceleration(k, water, J1[2], delta, thrust, ops)
+    return [
+        udot + (r * v_c - q * w_c),
+        vdot + (p * w_c - r * u_c),
+        wdot + (q * u_c - p * v_c),
+        pdot,
+        qdot,
+        rdot,
+    ]
 
 
 def right_hand_side(
@@ -115,26 +161,36 @@ def right_hand_side(
 ) -> list[Scalar]:
     """Time derivatives of ``state``: 12 as in ``STATE``, then the fins.
 
-    ``acceleration`` gives the rate of the velocity through the water; a steady current seen from the turning body
-    adds -omega x v_c.
-
-    Source     perron, eq. 2.9 and 2.11; fossen2021, ch. 10, for the current.
+    Source     perron, eq. 2.9 and 2.11.
+    Valid      |theta| below 90 deg; ``right_hand_side_quaternion`` has no such limit.
     """
-    delta = state[12:]
-    u, v, w, p, q, r = state[6:12]
+    nu, delta = state[6:12], state[12:]
     trig = trig_of(state[3:6], ops)
     J1 = rotation_matrix(trig)
-    u_c, v_c, w_c = product_transposed(J1, current)
-    udot, vdot, wdot, pdot, qdot, rdot = acceleration(k, [u - u_c, v - v_c, w - w_c, p, q, r], trig, delta, thrust, ops)
     return [
-        *product(J1, [u, v, w]),
-        *product(euler_matrix(trig), [p, q, r]),
-        udot + (r * v_c - q * w_c),
-        vdot + (p * w_c - r * u_c),
-        wdot + (q * u_c - p * v_c),
-        pdot,
-        qdot,
-        rdot,
+        *product(J1, nu[:3]),
+        *product(euler_matrix(trig), nu[3:]),
+        *acceleration_over_ground(k, J1, nu, delta, thrust, current, ops),
+        *actuator_rates(k.fins, delta, command, ops),
+    ]
+
+
+def right_hand_side_quaternion(
+    k: Constants, state: Vector, command: Vector, thrust: Scalar, current: Vector, ops: Ops
+) -> list[Scalar]:
+    """Time derivatives of ``state`` (13 + n_fins): x y z, e0 e1 e2 e3, u v w p q r, then the fins.
+
+    As ``right_hand_side``, with a unit quaternion (body to NED, scalar part first) for the attitude.
+
+    Source     perron, eq. 2.9 and 2.11; fossen2021, ch. 2, for the quaternion.
+    Valid      Every attitude.
+    """
+    e, nu, delta = state[3:7], state[7:13], state[13:]
+    J1 = quaternion_matrix(e)
+    return [
+        *product(J1, nu[:3]),
+        *quaternion_rates(e, nu[3:]),
+        *acceleration_over_ground(k, J1, nu, delta, thrust, current, ops),
         *actuator_rates(k.fins, delta, command, ops),
     ]
 
@@ -143,19 +199,24 @@ def right_hand_side(
 class Model:
     """A craft that moves: its rigid body and fins with a set of derivatives, in one of the two variants.
 
+    extra : a load of the user's own (``towtank.model.extra``), or None.
+
     Raises
     ------
     InputError
         The derivatives are about another point or for another water than the craft's, of an unknown variant or term,
-        or leave no positive mass.
+        or leave no positive mass; or the extra load cannot be used.
     """
 
     craft: Craft
     derivatives: Derivatives
     options: ModelOptions = field(default_factory=ModelOptions)
+    extra: ExtraLoad | None = None
 
     def __post_init__(self) -> None:
         _check_reference(self.craft, self.derivatives)
+        if self.extra is not None:
+            check_extra(self.extra, len(self.craft.fins))
         _ = self.constants
 
     @classmethod
@@ -185,13 +246,18 @@ class Model:
             screw=screw_of(self.craft, -c.Xuu),
             split=self.derivatives.variant == "split",
             options=self.options,
+            extra=self.extra,
         )
 
     @cached_property
     def body(self) -> Body:
         """Mass, inertia, CG and centre of buoyancy."""
         cb = self.options.centre_of_buoyancy
-        return body_of(self.craft, hydrostatics(self.craft).cb if cb is None else cb)
+        if cb is None:
+            from towtank.craft.hydrostatics import hydrostatics
+
+            cb = hydrostatics(self.craft).cb
+        return body_of(self.craft, cb)
 
     @cached_property
     def mass_matrix(self) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -220,7 +286,7 @@ class Model:
         fin_command : (n_fins,) fin angles asked for [rad], right-handed about the outward span.
         thrust : [N] that balances the resistance at the commanded speed, from ``thrust``.
         current : (3,) velocity of the water [m/s, NED], uniform and steady.
-        ops : elementary functions; chosen from the state when left out. Give ``casadi`` for symbols.
+        ops : elementary functions; chosen from the state when left out. Symbols need their own.
         """
         state, fin_command = _listed(state), _listed(fin_command)
         ops = ops or ops_for(*state, *fin_command, thrust)
@@ -240,16 +306,16 @@ class Model:
     def loads(self, state: Vector, thrust: Scalar, current: Vector = STILL) -> dict[str, list[Scalar]]:
         """Loads (6,) on the body by cause [N, N m].
 
-        "rigid body" (-C_RB nu), "added mass" (M_A nudot + C_A nu), "damping", "restoring", "fins", "thrust". They add
-        up to M_RB nudot; velocities and accelerations are relative to the water.
+        "rigid body" (-C_RB nu), "added mass" (M_A nudot + C_A nu), "damping", "restoring", "fins", "thrust", and
+        "extra" if there is one. They add up to M_RB nudot; velocities and accelerations are relative to the water.
         """
         state = _listed(state)
         ops = ops_for(*state, thrust)
-        trig = trig_of(state[3:6], ops)
-        drift = product_transposed(rotation_matrix(trig), current)
+        J1 = rotation_matrix(trig_of(state[3:6], ops))
+        drift = product_transposed(J1, current)
         water = [a - b for a, b in zip(state[6:12], drift, strict=False)] + state[9:12]
-        named = parts(self.constants, water, trig, state[12:], thrust, ops)
-        nudot = acceleration(self.constants, water, trig, state[12:], thrust, ops)
+        named = parts(self.constants, water, J1[2], state[12:], thrust, ops)
+        nudot = acceleration(self.constants, water, J1[2], state[12:], thrust, ops)
         inertia = product(self.constants.added, nudot)
         return {**named, "added mass": [a + b for a, b in zip(named["added mass"], inertia, strict=True)]}
 
@@ -257,12 +323,11 @@ class Model:
         """Hydrodynamic load (6,) [N, N m] of a prescribed motion: M_A nudot + C_A nu + D nu + fins.
 
         nu, nudot (6,) through water at rest; delta (n_fins,) [rad]. What a captive test measures, without weight,
-        buoyancy, thrust and the inertia of the body.
+        buoyancy, thrust, an extra load and the inertia of the body.
         """
         nu = _listed(nu)
         ops = ops_for(*nu, *nudot)
-        level = trig_of(STILL, MATH)
-        named = parts(self.constants, nu, level, _listed(delta), 0.0, ops)
+        named = parts(self.constants, nu, LEVEL, _listed(delta), 0.0, ops)
         inertia = product(self.constants.added, _listed(nudot))
         shares = (inertia, named["added mass"], named["damping"], named["fins"])
         return [sum(row) for row in zip(*shares, strict=True)]
@@ -286,6 +351,10 @@ class Model:
     def with_derivatives(self, derivatives: Derivatives) -> Model:
         """The same craft and options with another set of derivatives."""
         return replace(self, derivatives=derivatives)
+
+    def with_extra(self, extra: ExtraLoad | None) -> Model:
+        """The same model with a load of the user's own, or without one."""
+        return replace(self, extra=extra)
 
     def with_options(self, **options: Any) -> Model:
         """The same craft and derivatives with some options replaced."""

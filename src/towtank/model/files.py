@@ -14,7 +14,7 @@ from towtank.craft.craft import Craft, Fin, Mass, Profile, Propeller
 from towtank.craft.hull import Ellipsoid, Myring, Offsets, Suboff
 from towtank.derive.files import document as derivatives_document
 from towtank.derive.files import from_document as derivatives_of
-from towtank.errors import ArtefactError
+from towtank.errors import ArtefactError, InputError
 from towtank.model.equations import Model, ModelOptions
 from towtank.provenance import digest, provenance
 from towtank.water import Water
@@ -28,7 +28,21 @@ _STATIONS = 201
 
 
 def write_model(model: Model, path: str | Path) -> Path:
-    """Write ``model`` with its craft and derivatives as JSON, schema ``towtank/model/1``; SI units, radians."""
+    """Write ``model`` with its craft and derivatives as JSON, schema ``towtank/model/1``; SI units, radians.
+
+    Raises
+    ------
+    InputError
+        The model has an extra load, which is a Python function.
+    ArtefactError
+        The folder cannot be written.
+    """
+    if model.extra is not None:
+        raise InputError(
+            f"{path}: the model has the extra load {model.extra.name!r}. A model file holds numbers only: a Python "
+            "function cannot be stored in it. Keep the function in a script, write model.with_extra(None), and add the "
+            "load again with with_extra after reading."
+        )
     craft, derivatives = model.craft, model.derivatives
     document = {
         "schema": SCHEMA,

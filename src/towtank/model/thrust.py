@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from towtank.craft.craft import Craft
 from towtank.errors import CraftError
 from towtank.frames import Array
-from towtank.model.algebra import MATH, Ops, Scalar, interpolate
+from towtank.model.algebra import MATH, Ops, Scalar, Table, interpolate, table_of
 
 _FORCE_FLOOR = 1e-30
 """Smallest square of the shaft speed [1/s2] that divides the advance ratio."""
@@ -20,26 +19,22 @@ _FORCE_FLOOR = 1e-30
 class Screw:
     """A propeller in its working point.
 
-    advance, kt, kq : the open-water table, advance rising.   balance : advance ratio at which the thrust balances the
-    resistance; it is the same at every speed, because both grow with the square of speed.
     density [kg/m3], diameter [m], wake, deduction [-], torque : sense of the torque on the hull (+1, -1 or 0).
+    force_per_square : force on the hull per n|n| [N s2] where the thrust balances the resistance.
+    kt, kq : the open-water tables over the advance ratio.
+    balance : the advance ratio where the thrust balances the resistance. It is the same at every speed, because both
+        grow with the square of speed. It is for readers; the equations use ``force_per_square``.
     """
 
-    density: float
-    diameter: float
-    wake: float
-    deduction: float
-    torque: float
-    advance: tuple[float, ...]
-    kt: tuple[float, ...]
-    kq: tuple[float, ...]
-    balance: float
-
-    @property
-    def force_per_square(self) -> float:
-        """Force on the hull at the balance point per n|n| [N s2]."""
-        kt = interpolate(self.balance, self.advance, self.kt, MATH)
-        return float((1.0 - self.deduction) * self.density * self.diameter**4 * kt)
+    density: Scalar
+    diameter: Scalar
+    wake: Scalar
+    deduction: Scalar
+    torque: Scalar
+    force_per_square: Scalar
+    kt: Table
+    kq: Table
+    balance: float | None = None
 
 
 def screw_of(craft: Craft, resistance: float) -> Screw | None:
@@ -61,7 +56,8 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
         raise CraftError(
             f"{where}: the table needs a positive diameter and at least two rows (J, KT, KQ) with rising J."
         )
-    advance, kt, kq = (tuple(float(x) for x in column) for column in _to_zero_thrust(table).T)
+    advance, *curves = _to_zero_thrust(table).T.tolist()
+    kt, kq = (table_of(advance, curve) for curve in curves)
     demand = (
         resistance
         / (craft.water.density * propeller.diameter**2)
@@ -69,7 +65,7 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
     )
 
     def excess(j: float) -> float:
-        return float(interpolate(j, advance, kt, MATH)) - demand * j * j
+        return float(interpolate(j, kt, MATH)) - demand * j * j
 
     low, high = max(advance[0], 0.0), advance[-1]
     if resistance <= 0.0 or high <= low or excess(low) <= 0.0 or excess(high) >= 0.0:
@@ -77,14 +73,17 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
             f"{where}: no advance ratio between {low:g} and {high:g} gives a thrust that balances the resistance "
             f"{resistance:.4g} u2 N. Correct the table or the diameter, or leave the table out."
         )
+    from scipy.optimize import brentq
+
     balance = float(brentq(excess, low, high, xtol=1e-14))
+    per_square = craft.water.density * propeller.diameter**4 * float(interpolate(balance, kt, MATH))
     return Screw(
         craft.water.density,
         propeller.diameter,
         propeller.wake,
         propeller.thrust_deduction,
         propeller.torque,
-        advance,
+        (1.0 - propeller.thrust_deduction) * per_square,
         kt,
         kq,
         balance,
@@ -129,10 +128,11 @@ def thrust_load(screw: Screw | None, command: Scalar, u: Scalar, ops: Ops) -> tu
     square = command / screw.force_per_square
     n = ops.sqrt(ops.fabs(square) + _FORCE_FLOOR)
     sense = square / (n * n)
-    J = (1.0 - screw.wake) * u * sense / (n * screw.diameter)
-    head = screw.density * square * screw.diameter**4
-    force = (1.0 - screw.deduction) * head * interpolate(J, screw.advance, screw.kt, ops)
-    torque = screw.torque * head * screw.diameter * interpolate(J, screw.advance, screw.kq, ops)
+    D = screw.diameter
+    J = (1.0 - screw.wake) * u * sense / (n * D)
+    head = screw.density * square * (D * D * D * D)
+    force = (1.0 - screw.deduction) * head * interpolate(J, screw.kt, ops)
+    torque = screw.torque * head * D * interpolate(J, screw.kq, ops)
     return force, torque
 
 
