@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,13 +13,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import synthetic_craft as synthetic
-from towtank.errors import InputError, TrialError
-from towtank.model.algebra import MATH
+from towtank.craft.library import read_craft
+from towtank.errors import ArtefactError, InputError, TrialError
+from towtank.model.algebra import MATH, NUMPY
 from towtank.model.linear import horizontal
-from towtank.pilot.allocation import RUDDER_FIRST, YAW_AND_PITCH_FIRST, allocation, share
+from towtank.pilot.allocation import ELEVATOR_FIRST, ROUND_OFF, RUDDER_FIRST, YAW_AND_PITCH_FIRST, allocation, share
 from towtank.pilot.design import design_pilot
 from towtank.pilot.effort import effort
-from towtank.pilot.law import wrapped
+from towtank.pilot.files import UNITS, read_pilot, write_pilot
+from towtank.pilot.guidance import across, along, line, line_of_sight
+from towtank.pilot.law import GAINS, NO_PILOT, Pilot, Seen, authority, steer, wrapped
+from towtank.pilot.orders import ORDERS, Orders
 from towtank.trials.integrate import Leg, free_run
 from towtank.trials.mission import lawnmower
 from towtank.trials.start import setting
@@ -178,3 +185,167 @@ def test_below_the_inversion_speed_the_pilot_says_so():
     pilot = design_pilot(slow)
     assert any("inversion" in note for note in pilot.notes)
     assert max(s.real for s in pilot.eigenvalues["depth"]) < 0.0
+
+
+FINS = allocation(synthetic.craft())
+SWITCH = st.sampled_from([0.0, 1.0])
+ANGLE = st.floats(-1.2, 1.2)
+LIMITED = {"lookahead": st.floats(1.0, 40.0)} | dict.fromkeys(
+    ("piloted", "steer", "track", "dive", "damp_roll"), SWITCH
+)
+A_CASE = st.tuples(
+    st.fixed_dictionaries({name: LIMITED.get(name, ANGLE) for name in ORDERS}),
+    st.fixed_dictionaries({name: st.floats(0.1, 3.0) if name == "u" else ANGLE for name in Seen._fields}),
+    st.tuples(*[st.floats(-0.5, 0.5)] * 3),
+)
+
+
+@cache
+def gained():
+    return design_pilot(synthetic.model(synthetic.SUBOFF, speed=2.0))
+
+
+def flown(pilot, orders, seen, memory, ops, fins=FINS):
+    """The law's seven numbers."""
+    out = steer(pilot, fins.rows, fins.limits, orders, seen, memory, ops)
+    return [*out.granted, *out.memory_rates, out.heading]
+
+
+def in_lanes(dicts):
+    return SimpleNamespace(**{name: np.array([d[name] for d in dicts]) for name in dicts[0]})
+
+
+# Size of the terms each output is a sum of: angles and rates of about 1, a heading of up to half a turn.
+SCALE = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, np.pi])
+
+
+@given(st.lists(A_CASE, min_size=1, max_size=5))
+@settings(max_examples=60, deadline=None)
+def test_the_law_on_a_batch_is_the_law_on_each_lane(cases):
+    orders, seen, memory = zip(*cases, strict=True)
+    batch = flown(gained(), in_lanes(orders), in_lanes(seen), list(np.array(memory).T), NUMPY)
+    for lane, (o, s, m) in enumerate(cases):
+        alone = np.array(flown(gained(), Orders(**o), Seen(**s), m, MATH))
+        together = np.array([np.broadcast_to(x, (len(cases),))[lane] for x in batch])
+        # Round-off is relative to the terms of a sum. Sines of numpy and libm differ by an ulp.
+        assert (np.abs(together - alone) <= 1e-14 * np.maximum(np.abs(alone), SCALE)).all(), (alone, together)
+
+
+@given(st.lists(A_CASE, min_size=1, max_size=5))
+@settings(max_examples=60, deadline=None)
+def test_the_law_on_symbols_is_the_law_on_floats(law_of_symbols, cases):
+    for o, s, m in cases:
+        alone = np.array(flown(gained(), Orders(**o), Seen(**s), m, MATH))
+        gains = [getattr(gained(), name) for name in GAINS]
+        traced = law_of_symbols(gains, [o[name] for name in ORDERS], [s[name] for name in Seen._fields], m)
+        assert (np.abs(np.array(traced).ravel() - alone) <= 1e-13 * np.maximum(np.abs(alone), SCALE)).all()
+
+
+@pytest.fixture(scope="module")
+def law_of_symbols():
+    import casadi as ca
+
+    ops = SimpleNamespace(
+        sin=ca.sin, cos=ca.cos, fabs=ca.fabs, sqrt=ca.sqrt, fmin=ca.fmin, fmax=ca.fmax, atan2=ca.atan2,
+        floor=ca.floor, positive=lambda x: x > 0,
+    )  # fmt: skip
+
+    def named(names):
+        return SimpleNamespace(**{name: ca.SX.sym(name) for name in names})
+
+    pilot, orders, seen, memory = named(GAINS), named(ORDERS), named(Seen._fields), ca.SX.sym("m", 3)
+    out = flown(pilot, orders, seen, [memory[i] for i in range(3)], ops)
+    packed = [ca.vertcat(*vars(x).values()) for x in (pilot, orders, seen)]
+    return ca.Function("law", [*packed, memory], [ca.vertcat(*out)])
+
+
+COMMANDS = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+TAILS = st.sampled_from(["remus100", "suboff-x", "suboff-fins"]).map(lambda name: allocation(read_craft(name)))
+PRIORITY = st.sampled_from([RUDDER_FIRST, ELEVATOR_FIRST, YAW_AND_PITCH_FIRST])
+
+
+@given(COMMANDS, TAILS, PRIORITY)
+def test_what_is_granted_stays_within_every_fin_and_keeps_its_direction(command, fins, first):
+    granted = share(command, fins.rows, fins.limits, first, MATH)
+    # A fin that its group hardly moves, by entries of the mixing such as 6e-17, does not count as limited.
+    assert all(abs(a) <= limit + ROUND_OFF for a, limit in zip(fins.fins(granted), fins.limits, strict=True))
+    assert all(got * want >= 0.0 and abs(got) <= abs(want) for got, want in zip(granted, command, strict=True))
+    if first == YAW_AND_PITCH_FIRST:
+        assert granted[0] * command[1] == pytest.approx(granted[1] * command[0], abs=1e-15)
+
+
+@given(COMMANDS, TAILS, PRIORITY)
+def test_a_command_that_fits_column_by_column_is_granted_to_the_bit(command, fins, first):
+    size = max(
+        sum(abs(a * c) for a, c in zip(row, command, strict=True)) / limit
+        for row, limit in zip(fins.rows, fins.limits, strict=True)
+    )
+    command = tuple(c / max(1.0, size * (1.0 + 1e-9)) for c in command)
+    assert tuple(share(command, fins.rows, fins.limits, first, MATH)) == command
+
+
+@given(COMMANDS)
+def test_roll_gets_all_that_yaw_and_pitch_leave(command):
+    granted = share(command, FINS.rows, FINS.limits, YAW_AND_PITCH_FIRST, MATH)
+    full = max(abs(a) - limit for a, limit in zip(FINS.fins(granted), FINS.limits, strict=True)) >= -1e-9
+    assert full or granted[2] == command[2]
+
+
+def test_a_fin_at_its_limit_does_not_hold_a_group_that_does_not_move_it():
+    # A cross tail: the elevator's mixing has 3e-17 on the rudder's fins, which are full.
+    fins = allocation(read_craft("remus100"))
+    granted = share((1.0, 0.1, 0.0), fins.rows, fins.limits, RUDDER_FIRST, MATH)
+    assert granted == [pytest.approx(fins.limits[1]), 0.1, 0.0]
+
+
+def test_without_a_pilot_the_orders_are_the_command_and_the_memory_rests():
+    seen = Seen(**dict.fromkeys(Seen._fields, 0.3))
+    orders = Orders(rudder=0.1, elevator=-0.2, steer=1.0, heading=1.0, track=1.0, dive=1.0, depth=5.0)
+    assert flown(NO_PILOT, orders, seen, [0.1, 0.1, 0.1], MATH) == [0.1, -0.2, 0.0, 0.0, 0.0, 0.0, 0.3]
+
+
+def test_line_of_sight_points_at_the_lookahead_and_its_integral_rests_on_the_leg():
+    orders = Orders(**line((10.0, 0.0), (10.0, 50.0), lookahead=5.0, drift=0.1, crab=0.05))
+    assert along(orders, 13.0, 20.0, MATH) == pytest.approx(20.0)
+    assert across(orders, 13.0, 20.0, MATH) == pytest.approx(-3.0)  # north of a leg to the east: to port
+    heading, rate = line_of_sight(orders, 13.0, 20.0, 0.0, MATH)
+    assert heading == pytest.approx(np.pi / 2.0 - 0.05 + np.arctan(3.0 / 5.0))
+    assert rate == pytest.approx(0.1 * 25.0 * -3.0 / (25.0 + 9.0))
+    assert line_of_sight(orders, 10.0, 20.0, 1.0, MATH)[1] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_depth_orders_fade_out_towards_the_inversion_speed():
+    pilot = Pilot("some", 2.0, reversal=1.0)
+    assert [authority(pilot, u, MATH) for u in (0.5, 1.0, 1.025, 1.05, 2.0)] == pytest.approx([0, 0, 0.5, 1, 1])
+    assert [authority(NO_PILOT, u, MATH) for u in (-1.0, 0.0, 1e-3, 2.0)] == [1.0] * 4
+    assert design_pilot(synthetic.model(synthetic.SUBOFF, speed=0.5)).reversal == 0.0
+    assert 0.5 < gained().reversal < gained().speed
+
+
+def test_a_pilot_comes_back_from_its_file_as_it_was(tmp_path):
+    pilot = replace(gained(), notes=("one", "two"), margins={**gained().margins, "free": (np.inf, 0.0, np.inf)})
+    assert read_pilot(write_pilot(pilot, tmp_path / "pilot.json")) == pilot
+    assert list(tmp_path.iterdir()) == [tmp_path / "pilot.json"]
+
+
+@pytest.mark.parametrize("change", [
+    {"gains": {}}, {"gains": None}, {"margins": {"heading": {}}}, {"eigenvalues": {"heading": [1.0]}}, {"notes": None},
+])  # fmt: skip
+def test_a_pilot_file_with_a_part_missing_is_refused_with_its_name(tmp_path, change):
+    path = write_pilot(gained(), tmp_path / "pilot.json")
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(ArtefactError, match=r"pilot\.json is not a whole pilot"):
+        read_pilot(path)
+
+
+def test_a_pilot_file_with_no_speed_is_refused(tmp_path):
+    with pytest.raises(ArtefactError, match="speed cannot be used"):
+        read_pilot(write_pilot(replace(gained(), speed=0.0), tmp_path / "pilot.json"))
+
+
+def test_the_numbers_of_the_law_are_named_in_order():
+    assert (GAINS[0], GAINS[-1], len(GAINS)) == ("speed", "reversal", 18)
+    assert ORDERS[0] == "piloted"
+    assert all(isinstance(getattr(NO_PILOT, name), float) for name in GAINS)
+    assert all(isinstance(getattr(Orders(), name), float) for name in ORDERS)
+    assert set(UNITS) == set(GAINS)

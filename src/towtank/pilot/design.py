@@ -68,7 +68,6 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
     k_q, k_theta = pitch[2]
     order = _pitch_order(pitch)
     k_h, k_z, k_zi = depth[2][2:] / order
-    reversal = elevator_reversal_speed(model, "wide") or 0.0
     loops: dict[str, Loop] = {"heading": heading, "depth": depth, "roll": roll}
     return Pilot(
         craft=model.craft.name,
@@ -89,8 +88,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
         unwind=2.0 * length / speed,
         heading_band=float(HEADING_ERROR * BAND_SHARE),
         depth_band=float(DEPTH_ERROR * length * BAND_SHARE),
-        # A pilot designed below the inversion speed is designed for the reversed elevator: nothing to hold back.
-        reversal=reversal if reversal < speed else 0.0,
+        reversal=_reversal(model, speed),
         eigenvalues={name: tuple(complex(s) for s in closed_loop(*loop)) for name, loop in loops.items()},
         margins={
             "heading": margins(*heading),
@@ -182,6 +180,15 @@ def _roll(linear: LinearModel, speed: float, length: float, lag: float, range_: 
     gains = output_feedback(full, outputs, weights)
     stable = closed_loop(full, outputs, gains)[0].real < 0.0
     return full, outputs, gains if stable else np.zeros(2)
+
+
+def _reversal(model: Model, speed: float) -> float:
+    """Speed [m/s] below which the elevator acts reversed on depth; 0 if there is none below ``speed``.
+
+    A pilot for less than the inversion speed is designed for the reversed elevator and has no order to hold back.
+    """
+    found = elevator_reversal_speed(model, "wide") or 0.0
+    return found if found < speed else 0.0
 
 
 def _at(speed: float) -> str:

@@ -1,0 +1,90 @@
+"""``pilot.json``: the gains of a pilot, written whole, read back equal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from towtank.artefact import read_json, write_json
+from towtank.errors import ArtefactError
+from towtank.pilot.law import GAINS, Pilot
+from towtank.provenance import provenance
+
+SCHEMA = "towtank/pilot/1"
+
+UNITS: Mapping[str, str] = {
+    "speed": "m/s", "yaw_rate": "s", "heading": "1/s", "heading_integral": "1/s", "turn_limit": "rad/s",
+    "pitch_rate": "s", "pitch": "", "pitch_order": "", "depth": "rad/m", "depth_rate": "rad s/m",
+    "depth_integral": "rad/(m s)", "pitch_limit": "rad", "roll": "", "roll_rate": "s", "unwind": "s",
+    "heading_band": "rad", "depth_band": "m", "reversal": "m/s",
+}  # fmt: skip
+"""Unit of each of ``GAINS``."""
+
+_MARGINS = ("largest_gain_factor", "smallest_gain_factor", "phase_margin")
+
+
+def write_pilot(pilot: Pilot, path: str | Path) -> Path:
+    """Write ``pilot`` as JSON, schema ``towtank/pilot/1``; SI units, radians. A margin without limit is null.
+
+    Raises
+    ------
+    ArtefactError
+        The folder cannot be written.
+    """
+    document = {
+        "schema": SCHEMA,
+        "craft": pilot.craft,
+        "gains": {name: {"value": getattr(pilot, name), "unit": UNITS[name]} for name in GAINS},
+        "eigenvalues": {loop: [[s.real, s.imag] for s in values] for loop, values in pilot.eigenvalues.items()},
+        "margins": {loop: dict(zip(_MARGINS, values, strict=True)) for loop, values in pilot.margins.items()},
+        "notes": list(pilot.notes),
+        "provenance": provenance(),
+    }
+    return write_json(Path(path), document)
+
+
+def read_pilot(path: str | Path) -> Pilot:
+    """Read a pilot written by ``write_pilot``.
+
+    Raises
+    ------
+    ArtefactError
+        Missing, not JSON, another schema, a gain that is missing or not a finite number, a speed that is not positive.
+    """
+    path = Path(path)
+    document = read_json(path, SCHEMA)
+    try:
+        return Pilot(
+            craft=str(document["craft"]),
+            **_gains(document["gains"]),
+            eigenvalues={
+                loop: tuple(complex(float(re), float(im)) for re, im in values)
+                for loop, values in document["eigenvalues"].items()
+            },
+            margins={loop: _margins(values) for loop, values in document["margins"].items()},
+            notes=tuple(str(note) for note in document["notes"]),
+        )
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ArtefactError(
+            f"{path} is not a whole pilot ({type(error).__name__}: {error}). Every gain must be a finite number, the "
+            "speed above zero, because the gains are scheduled with (speed / u)^2. Write it again with write_pilot."
+        ) from None
+
+
+def _gains(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    gains = {name: float(entries[name]["value"]) for name in GAINS}
+    bad = [name for name, value in gains.items() if not math.isfinite(value)]
+    bad += [name for name in ("speed", "unwind") if not gains[name] > 0.0]
+    if bad:
+        raise ValueError(f"{', '.join(bad)} cannot be used")
+    wrong = [name for name in GAINS if entries[name]["unit"] != UNITS[name]]
+    if wrong:
+        raise ValueError(f"unit of {', '.join(wrong)}")
+    return gains
+
+
+def _margins(entries: Mapping[str, Any]) -> tuple[float, float, float]:
+    up, down, phase = (math.inf if entries[name] is None else float(entries[name]) for name in _MARGINS)
+    return up, down, phase
