@@ -1,17 +1,18 @@
-"""The linear model about straight level flight, stability indices and elevator reversal."""
+"""The linear model about straight level flight or any other state, stability indices and elevator reversal."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from towtank.errors import InputError
-from towtank.frames import Array
+from towtank.frames import Array, rotation
+from towtank.model.algebra import Vector
 from towtank.model.dual import DUAL, Dual, gradients, variables
-from towtank.model.equations import STATE, Model
+from towtank.model.equations import STATE, STILL, Model
 from towtank.model.values import to_variant
 
 INPUTS = ("rudder", "elevator", "aileron", "thrust")
@@ -22,12 +23,14 @@ SLOPES = ("wide", "origin")
 
 @dataclass(frozen=True)
 class LinearModel:
-    """d(states)/dt = A states + B inputs, as deviations from straight level flight at ``speed`` [m/s].
+    """d(states)/dt = A states + B inputs + remainder, as deviations from a reference flight.
 
+    The reference is straight level flight at ``speed`` [m/s] (``linearise``) or any state (``linearise_at``); ``speed``
+    is then its speed through the water.
     A (n, n), B (n, m) in SI with angles in radians.   states, inputs : names, as in ``STATE`` and ``INPUTS``.
     slopes : "wide" (the fit the model flies on) or "origin" (slopes at zero incidence).
     remainder (n,) : rates of the reference flight itself; not zero for a craft that is not trimmed there, for
-        example a heavy one.
+        example a heavy one. ``linearise`` leaves out the rate of x, the travel along the track.
     """
 
     A: Array
@@ -81,15 +84,12 @@ class StabilityIndices:
 
 
 def linearise(model: Model, speed: float, slopes: str = "wide") -> LinearModel:
-    """All 12 states and 4 inputs, linearised exactly about straight level flight.
+    """All 12 states and 4 inputs, linearised exactly about straight level flight: ``linearise_at`` there.
 
     Parameters
     ----------
     speed : [m/s], through water at rest; the thrust balances the resistance.
     slopes : "wide" for the values the model flies on, "origin" for the slopes at zero incidence.
-
-    Source     The equations of ``towtank.model.equations``, run once on dual numbers: no step size.
-    Departure  Fin angles act at once; actuator lag and limits are left to the autopilot's design.
 
     Raises
     ------
@@ -98,14 +98,54 @@ def linearise(model: Model, speed: float, slopes: str = "wide") -> LinearModel:
     """
     if not speed > 0.0:
         raise InputError(f"speed {speed} m/s: straight flight needs a positive speed.")
+    thrust = float(with_slopes(model, slopes).thrust(speed))
+    straight = [0.0] * 6 + [speed] + [0.0] * (5 + len(model.craft.fins))
+    linear = linearise_at(model, straight, thrust, slopes=slopes)
+    return replace(linear, remainder=np.where(np.array(STATE) == "x", 0.0, linear.remainder))
+
+
+def linearise_at(
+    model: Model, state: Vector, thrust: float, current: Vector = STILL, slopes: str = "wide"
+) -> LinearModel:
+    """All 12 states and 4 inputs, linearised exactly about ``state``.
+
+    Parameters
+    ----------
+    state : (12 + n_fins,) as in ``Model.states``: any state, trimmed or not; the inputs are deviations of rudder,
+        elevator, aileron from its fin angles.
+    thrust, current : as in ``Model.rates``.
+    slopes : as in ``linearise``.
+
+    Source     The equations of ``towtank.model.equations``, run once on dual numbers: no step size.
+    Departure  Fin angles act at once; actuator lag and limits are left to the autopilot's design.
+    Valid      |theta| below 90 deg. A and B are those of the moment: in a steady turn they stay as they are in still
+               water, but for the rows of x and y; in a current the others change with the heading too.
+
+    Raises
+    ------
+    InputError
+        A state of another length or not finite, theta at 90 deg or beyond, or no origin slopes in the derivatives.
+    """
     model = with_slopes(model, slopes)
-    size = len(STATE)
-    x = variables(np.concatenate([np.zeros(6), [speed], np.zeros(8), [model.thrust(speed)]]))
-    delta = model.fin_angles(*x[size : size + 3])
-    rates = model.rates([*x[:size], *delta], delta, x[-1], ops=DUAL)[:size]
+    size, fins = len(STATE), len(model.craft.fins)
+    start = np.asarray(state, dtype=float)
+    if start.shape != (size + fins,) or not np.isfinite([*start, thrust, *current]).all():
+        raise InputError(
+            f"linearise_at: the state has the shape {start.shape} or holds a number that is not finite. Give "
+            f"{size + fins} finite numbers, {', '.join(model.states)}, and a finite thrust and current."
+        )
+    if not np.cos(start[STATE.index("theta")]) > 0.0:
+        raise InputError(
+            f"linearise_at: theta = {np.degrees(start[STATE.index('theta')]):.4g} deg. The limit is 90 deg, where the "
+            "rates of phi and psi grow without bound; give the attitude with |theta| below it."
+        )
+    x = variables(np.concatenate([start[:size], np.zeros(3), [thrust]]))
+    moved = model.fin_angles(*x[size : size + 3])
+    delta = [angle + float(held) for angle, held in zip(moved, start[size:], strict=True)]
+    rates = model.rates([*x[:size], *delta], delta, x[-1], current, ops=DUAL)[:size]
     slope = gradients(rates, len(x))
     remainder = np.array([rate.value if isinstance(rate, Dual) else float(rate) for rate in rates])
-    remainder[STATE.index("x")] = 0.0
+    speed = float(np.linalg.norm(start[6:9] - rotation(start[3:6]).T @ np.asarray(current, dtype=float)))
     return LinearModel(slope[:, :size], slope[:, size:], STATE, INPUTS, speed, slopes, remainder)
 
 
