@@ -20,6 +20,8 @@ _PUBLIC = {
     "Run": "towtank.tank.run",
     "Derivatives": "towtank.derive.table",
     "Model": "towtank.model.equations",
+    "ExtraLoad": "towtank.model.extra",
+    "read_model": "towtank.model.files",
     "straight_run": "towtank.trials.straight",
     "turning_circle": "towtank.trials.circle",
     "zigzag": "towtank.trials.zigzag",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,8 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
 
     resistance : -Xuu [kg/m].
 
+    Source     KT(J) rho n^2 D^4 (1 - t) = resistance u^2 with u = n D J / (1 - w): KT = demand J^2.
+
     Raises
     ------
     CraftError
@@ -64,18 +67,13 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
         / ((1.0 - propeller.thrust_deduction) * (1.0 - propeller.wake) ** 2)
     )
 
-    def excess(j: float) -> float:
-        return float(interpolate(j, kt, MATH)) - demand * j * j
-
     low, high = max(advance[0], 0.0), advance[-1]
-    if resistance <= 0.0 or high <= low or excess(low) <= 0.0 or excess(high) >= 0.0:
+    if resistance <= 0.0 or high <= low or _excess(low, kt, demand) <= 0.0 or _excess(high, kt, demand) >= 0.0:
         raise CraftError(
             f"{where}: no advance ratio between {low:g} and {high:g} gives a thrust that balances the resistance "
             f"{resistance:.4g} u2 N. Correct the table or the diameter, or leave the table out."
         )
-    from scipy.optimize import brentq
-
-    balance = float(brentq(excess, low, high, xtol=1e-14))
+    balance = _balance(kt, demand)
     per_square = craft.water.density * propeller.diameter**4 * float(interpolate(balance, kt, MATH))
     return Screw(
         craft.water.density,
@@ -88,6 +86,22 @@ def screw_of(craft: Craft, resistance: float) -> Screw | None:
         kq,
         balance,
     )
+
+
+def _excess(j: float, kt: Table, demand: float) -> float:
+    """Thrust coefficient at the advance ratio ``j`` beyond the one the resistance asks for, demand j^2."""
+    return float(interpolate(j, kt, MATH)) - demand * j * j
+
+
+def _balance(kt: Table, demand: float) -> float:
+    """Advance ratio J > 0 where KT(J) = demand J^2, on the first segment that crosses: the root of a parabola."""
+    crossed = (i for i, knot in enumerate(kt.knots) if i and knot > 0.0 and _excess(knot, kt, demand) <= 0.0)
+    i = next(crossed)
+    slope = float(kt.slopes[i - 1])
+    at_zero = float(interpolate(kt.knots[i], kt, MATH)) - slope * kt.knots[i]
+    root = math.sqrt(slope * slope + 4.0 * demand * at_zero)
+    # of the two ways to write the larger root, the one that adds two numbers of equal sign
+    return 2.0 * at_zero / (root - slope) if slope < 0.0 else (slope + root) / (2.0 * demand)
 
 
 def _to_zero_thrust(table: Array) -> Array:
