@@ -1,0 +1,1 @@
+"""The engine: the closed loop as one text, compiled, vectorised and differentiated."""

@@ -1,0 +1,197 @@
+"""Run one trajectory or many: on the compiled loop, in threads, or on numpy where there is none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from towtank.engine.flights import Flights
+from towtank.engine.form import Form, form_of
+from towtank.engine.library import Library, library
+from towtank.engine.loop import KINEMATIC, MEMORY, channels
+from towtank.engine.parameters import parameters, varied
+from towtank.engine.plan import Clock, Ended, Gauge, Leg, Log, Stat, gauge_table, leg_table, place
+from towtank.errors import InputError
+from towtank.frames import Array
+from towtank.model.equations import STILL, Model
+from towtank.pilot.law import NO_PILOT, Pilot
+from towtank.progress import Progress, Silent
+
+FASTEST = 10.0
+"""A trajectory is stopped beyond this multiple of the larger of the craft's speed and its own at the start."""
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """The arrays of a run, in and out, as the loop wants them; N trajectories."""
+
+    common: Array
+    which: Array
+    varied: Array
+    start: Array
+    plan: Array
+    gauge: Array
+    channel: Array
+    log: Array
+    stats: Array
+    marks: Array
+    end: Array
+    status: Array
+    clock: Clock
+    every: int
+    fastest: float
+
+    @property
+    def count(self) -> int:
+        """Number of trajectories."""
+        return len(self.status)
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """What differs between N trajectories; what is not given is shared.
+
+    parameters : name -> (N,), as in ``Form.names``: derivatives, ``m``, ``xG``, ``zG``, ``current_north``, ``thrust``, ...
+    start (N, 13 + n + 3) : state and memory.   orders : order name -> (N,) or (N, legs).
+    """
+
+    count: int = 1
+    parameters: Mapping[str, Array] = field(default_factory=dict)
+    start: Array | None = None
+    orders: Mapping[str, Array] = field(default_factory=dict)
+
+
+ONE = Ensemble()
+
+
+def fly(
+    model: Model,
+    start: Sequence[float] | Array,
+    legs: Sequence[Leg],
+    *,
+    thrust: float,
+    pilot: Pilot | None = None,
+    current: Sequence[float] = STILL,
+    clock: Clock | None = None,
+    log: Log | None = None,
+    gauges: Sequence[Gauge] = (),
+    ensemble: Ensemble = ONE,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> Flights:
+    """Fly ``model`` through ``legs``.
+
+    Parameters
+    ----------
+    start : (13 + n + 3,) state and memory of the steering, from ``towtank.engine.start.at``.
+    thrust : [N].   current : (3,) [m/s, NED].   clock : control period and steps.   log : what is kept over time, nothing
+        when left out.   gauges : what is watched in every leg.   ensemble : what differs between trajectories.
+    threads : that share the trajectories; all cores when left out.
+
+    An interruption (Ctrl-C) keeps the trajectories that are finished; the others are marked ``Ended.STOPPED``.
+
+    Raises
+    ------
+    InputError
+        A start, leg, gauge or parameter that cannot be used.
+    """
+    form = form_of(model)
+    arrays = _arrays(form, model, pilot or NO_PILOT, start, legs, thrust, current, clock or Clock(), log, gauges, ensemble)
+    compiled = library(form)
+    if compiled is not None:
+        from towtank.engine.threads import run_threads
+
+        run_threads(compiled, arrays, progress or Silent(), threads)
+    else:
+        from towtank.engine.reference import run_numpy
+
+        run_numpy(form, arrays, progress or Silent())
+    return _flights(form, model, arrays, legs, gauges, log, compiled)
+
+
+def _arrays(
+    form: Form, model: Model, pilot: Pilot, start: Sequence[float] | Array, legs: Sequence[Leg], thrust: float,
+    current: Sequence[float], clock: Clock, log: Log | None, gauges: Sequence[Gauge], ensemble: Ensemble,
+) -> Arrays:  # fmt: skip
+    count, fins = ensemble.count, form.fins
+    names = channels(fins)
+    common = parameters(form, model, pilot, thrust, current)
+    which, values = np.zeros(0, np.int64), np.zeros((count, 0))
+    if ensemble.parameters:
+        which, values = varied(form, common, ensemble.parameters)
+    begin = _start(model, form, start if ensemble.start is None else ensemble.start)
+    plan = leg_table(legs, fins)
+    if ensemble.orders:
+        plan = _orders(plan, legs, ensemble)
+    for what, rows in (("parameters", len(values)), ("start", len(begin) if begin.ndim == 2 else count)):
+        if rows != count:
+            raise InputError(f"ensemble of {count}: {what} hold {rows} trajectories. Give one row for each.")
+    logged = np.array([place(name, fins) for name in (log.names or names)] if log else [], dtype=np.int64)
+    longest = float(plan[..., 0].sum(axis=-1).max())
+    samples = math.floor(longest / (clock.tick * log.every) + 1e-9) + 1 if log else 0
+    speed = np.linalg.norm(begin[..., 7:10], axis=-1).max()
+    return Arrays(
+        common=common, which=which, varied=values, start=begin, plan=plan, gauge=gauge_table(gauges, fins), channel=logged,
+        log=np.full((count, samples, len(logged)), np.nan),
+        stats=np.full((count, len(legs), len(gauges), len(Stat)), np.nan),
+        marks=np.full((count, len(legs), 2 + len(names)), np.nan),
+        end=np.full((count, KINEMATIC + fins + len(MEMORY)), np.nan),
+        status=np.tile([float(Ended.STOPPED), 0.0], (count, 1)),
+        clock=clock, every=log.every if log else 1, fastest=FASTEST * max(float(speed), model.craft.speed),
+    )  # fmt: skip
+
+
+def _start(model: Model, form: Form, start: Sequence[float] | Array) -> Array:
+    """Start in the form's own number of fins; fins that are not there stand at zero."""
+    given = np.asarray(start, dtype=float)
+    have = len(model.craft.fins)
+    size = KINEMATIC + have + len(MEMORY)
+    if given.shape[-1] != size or given.ndim > 2 or not np.all(np.isfinite(given)):
+        raise InputError(
+            f"run of {model.craft.name}: the start needs {size} finite numbers (13 of the craft with its quaternion, {have} "
+            f"fin angles, 3 of the steering), got shape {given.shape}. Build it with towtank.engine.start.at."
+        )
+    none = np.zeros((*given.shape[:-1], form.fins - have))
+    return np.ascontiguousarray(np.concatenate([given[..., : size - 3], none, given[..., size - 3 :]], axis=-1))
+
+
+def _orders(plan: Array, legs: Sequence[Leg], ensemble: Ensemble) -> Array:
+    """A leg table for every trajectory."""
+    from towtank.pilot.orders import ORDERS
+
+    table = np.tile(plan, (ensemble.count, 1, 1))
+    for name, values in ensemble.orders.items():
+        if name not in ORDERS:
+            raise InputError(f"ensemble: no order {name!r}. Choose from {', '.join(ORDERS)}.")
+        given = np.asarray(values, dtype=float)
+        table[:, :, 5 + ORDERS.index(name)] = given[:, None] if given.ndim == 1 else given
+    return table
+
+
+def _flights(
+    form: Form, model: Model, a: Arrays, legs: Sequence[Leg], gauges: Sequence[Gauge], log: Log | None,
+    compiled: Library | None,
+) -> Flights:  # fmt: skip
+    names, have = channels(form.fins), len(model.craft.fins)
+    real = [i for i in range(a.end.shape[1]) if not KINEMATIC + have <= i < KINEMATIC + form.fins]
+    return Flights(
+        legs=tuple(legs),
+        gauges=tuple(gauges),
+        names=names,
+        logged=(log.names or names) if log else (),
+        time=a.clock.tick * a.every * np.arange(a.log.shape[1]),
+        log=a.log,
+        mark_time=a.marks[:, :, 0],
+        by_event=a.marks[:, :, 1] == 1.0,
+        mark=a.marks[:, :, 2:],
+        stats=a.stats,
+        ended=a.status[:, 0].astype(np.int64),
+        end_time=a.status[:, 1],
+        state=a.end[:, real],
+        path="numpy" if compiled is None else compiled.target.name,
+    )
+
+
