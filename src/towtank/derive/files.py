@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from towtank.artefact import read_json, write_json
-from towtank.derive.show import prime_factor, std_parts
 from towtank.derive.table import Derivatives, Reference
 from towtank.errors import ArtefactError
 from towtank.symbols import TERMS
@@ -30,6 +29,8 @@ def write_derivatives(d: Derivatives, path: Path | str) -> Path:
 
 def document(d: Derivatives) -> dict[str, Any]:
     """The content of ``derivatives.json``."""
+    from towtank.derive.show import prime_factor, std_parts
+
     parts = std_parts(d)
     total = np.sqrt(np.diag(d.covariance))
     terms = {
