@@ -15,6 +15,7 @@ from towtank.cli.plan import plan
 from towtank.cli.report import report
 from towtank.cli.run import run
 from towtank.cli.status import status
+from towtank.cli.sweep import sweep
 from towtank.cli.tow import tow
 from towtank.cli.trial import trial
 from towtank.provenance import VERSION
@@ -46,5 +47,5 @@ def options(
     """Options before the command; ``--version`` acts in its callback."""
 
 
-for _command in (run, new, check, plan, tow, status, derive, trial, assess, report, doctor):
+for _command in (run, new, check, plan, tow, status, derive, trial, assess, sweep, report, doctor):
     app.command()(_command)

@@ -1,1 +1,1 @@
-"""Sweeps: one craft varied, every variant taken from captive tests to the verdict."""
+"""Sweeps: a craft varied along some axes, every variant taken from captive tests to the verdict."""

@@ -1,0 +1,189 @@
+"""A craft with some of its numbers changed: the axes of a sweep."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from towtank.craft.craft import Craft, Mass
+from towtank.craft.mass import as_rows, move_inertia
+from towtank.errors import CraftError, InputError
+from towtank.quantity import Quantity, si
+from towtank.sweep import fins
+
+HEAVIEST = 0.5
+"""Net weight over mass beyond which a craft does not stay submerged or does not stay up; that of the craft file."""
+_LENGTHS = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(?:L|lengths?)\s*")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One number of a craft that can be varied: unit, meaning, how to read and how to change it."""
+
+    name: str
+    unit: str
+    meaning: str
+    base: Callable[[Craft], float]
+    change: Callable[[Craft, float], Craft]
+    in_lengths: bool = False
+
+
+def _with_cg(craft: Craft, axis: int, value: float) -> Craft:
+    """The CG moved along one axis, the inertia about it kept."""
+    old = craft.mass
+    if value == old.cg[axis]:
+        return craft
+    point = [*old.cg]
+    point[axis] = value
+    nothing = np.zeros((3, 3))
+    inertia = np.array(old.inertia) - move_inertia(nothing, old.mass, np.array(old.cg))
+    moved = move_inertia(inertia, old.mass, np.array(point))
+    mass = replace(old, cg=(point[0], point[1], point[2]), inertia=as_rows(moved))
+    station, aside = craft.origin_from_nose - point[0], math.hypot(point[1], point[2])
+    radius = float(craft.profile.radius(np.array(station))) if 0.0 <= station <= craft.length else 0.0
+    if aside > radius or radius == 0.0:
+        raise CraftError(
+            f"cg_{'xyz'[axis]}: the centre of gravity of this variant of {craft.name} lies {station:.4g} m aft of the "
+            f"nose and {aside:.4g} m off the axis, where the hull has a radius of {radius:.4g} m. It must lie inside "
+            "the hull; cg is measured from the body origin, x forward, z down."
+        )
+    return replace(craft, mass=mass)
+
+
+def _weighed(craft: Craft, mass: Mass, what: str) -> Craft:
+    residual = (mass.mass - mass.displaced_mass) / mass.mass if mass.mass > 0.0 else math.inf
+    if not abs(residual) < HEAVIEST:
+        raise CraftError(
+            f"{what}: this variant of {craft.name} has {mass.mass:.6g} kg and displaces {mass.displaced_mass:.6g} kg. "
+            f"A net weight beyond {100 * HEAVIEST:g} % of the mass is no submerged craft; give a smaller change."
+        )
+    return replace(craft, mass=mass)
+
+
+def _with_mass(craft: Craft, value: float) -> Craft:
+    """All masses scaled in place: the CG stays, the inertia grows in proportion, the buoyancy stays."""
+    old = craft.mass
+    if value == old.mass:
+        return craft
+    inertia = as_rows(np.array(old.inertia) * (value / old.mass))
+    return _weighed(craft, replace(old, mass=value, inertia=inertia), "mass")
+
+
+def _with_ballast(craft: Craft, value: float) -> Craft:
+    """A point mass added at the CG, or taken out: the inertia about the CG stays, the buoyancy stays."""
+    old = craft.mass
+    if value == 0.0:
+        return craft
+    extra = move_inertia(np.zeros((3, 3)), value, np.array(old.cg))
+    mass = replace(old, mass=old.mass + value, inertia=as_rows(np.array(old.inertia) + extra))
+    return _weighed(craft, mass, "ballast")
+
+
+def _with_speed(craft: Craft, value: float) -> Craft:
+    if not value > 0.0:
+        raise InputError(f"speed: {value:g} m/s. The craft must move ahead; give a speed above zero.")
+    return replace(craft, speed=value)
+
+
+def _one(craft: Craft) -> float:
+    return 1.0
+
+
+def _area(craft: Craft, value: float) -> Craft:
+    if not value > 0.0:
+        raise CraftError(f"fin_area: a factor of {value:g} leaves no fin. Give a factor above zero.")
+    return fins.scaled(craft, math.sqrt(value), math.sqrt(value))
+
+
+KINDS: dict[str, Kind] = {
+    kind.name: kind
+    for kind in (
+        Kind("fin_size", "", "factor on span and chords of all fins", _one, lambda c, s: fins.scaled(c, s, s)),
+        Kind("fin_area", "", "factor on the area of all fins, their shape kept", _one, _area),
+        Kind("fin_span", "", "factor on the exposed span of all fins", _one, lambda c, s: fins.scaled(c, s, 1.0)),
+        Kind("fin_chord", "", "factor on the chords of all fins", _one, lambda c, s: fins.scaled(c, 1.0, s)),
+        Kind("fin_angle", "rad", "angle of X fins from the horizontal", fins.fin_angle, fins.turned),
+        Kind(
+            "fin_position", "m", "root trailing edge of the aftmost fin aft of the nose; all fins move alike",
+            fins.fin_position, fins.moved, in_lengths=True,
+        ),
+        Kind(
+            "cg_x", "m", "centre of gravity forward of the body origin",
+            lambda c: c.mass.cg[0], lambda c, x: _with_cg(c, 0, x), in_lengths=True,
+        ),
+        Kind(
+            "cg_z", "m", "centre of gravity below the body origin",
+            lambda c: c.mass.cg[2], lambda c, z: _with_cg(c, 2, z), in_lengths=True,
+        ),
+        Kind("mass", "kg", "mass; inertia in proportion, buoyancy kept", lambda c: c.mass.mass, _with_mass),
+        Kind("ballast", "kg", "mass added at the CG; buoyancy kept", lambda c: 0.0, _with_ballast),
+        Kind("speed", "m/s", "reference speed of tests and trials", lambda c: c.speed, _with_speed),
+    )
+}  # fmt: skip
+"""What can be varied, in the order in which the changes of one variant are made."""
+
+_ABSENT = {
+    "strakes": "a craft file knows no strakes yet: hull and fins are all that the tank sees",
+    "strake_size": "a craft file knows no strakes yet: hull and fins are all that the tank sees",
+}
+
+
+def kind(name: str) -> Kind:
+    """What the axis ``name`` varies.
+
+    Raises
+    ------
+    InputError
+        There is no such axis.
+    """
+    if name in KINDS:
+        return KINDS[name]
+    if name in _ABSENT:
+        raise InputError(f"{name} cannot be varied: {_ABSENT[name]}. Axes: {', '.join(KINDS)}.")
+    near = difflib.get_close_matches(name, KINDS, n=1, cutoff=0.5)
+    hint = f" Did you mean {near[0]}?" if near else ""
+    raise InputError(f"{name!r} is nothing that can be varied.{hint} Axes: {', '.join(KINDS)}.")
+
+
+def number(craft: Craft, name: str, value: Quantity) -> float:
+    """``value`` of the axis ``name`` in SI. A text such as ``"0.95 L"`` counts in lengths of the craft.
+
+    Raises
+    ------
+    InputError
+        There is no such axis, or the value is no quantity of its kind.
+    """
+    what = kind(name)
+    if what.in_lengths and isinstance(value, str) and (lengths := _LENGTHS.fullmatch(value)):
+        return si(lengths[1], "", name) * craft.length
+    return si(value, what.unit, name)
+
+
+def vary(craft: Craft, **changes: Quantity) -> Craft:
+    """``craft`` with the numbers in ``changes`` replaced; whatever they do not name stays.
+
+    Parameters
+    ----------
+    changes : name of an axis (``KINDS``) -> SI number or text with a unit; angles need one. Lengths may be given in
+        lengths of the craft, ``"0.95 L"``. The order of the arguments has no effect.
+
+    The body origin, the hull and the displaced mass stay, so that all variants are compared about one point and at
+    one buoyancy; larger fins move the centre of buoyancy by their own small volume. The craft given is unchanged.
+
+    Raises
+    ------
+    InputError
+        Unknown name, wrong unit, a speed that is not positive.
+    CraftError
+        A variant that cannot be built: fins off the hull, a CG outside it, no fins or no X fins to vary, too heavy.
+    """
+    given = {name: number(craft, name, value) for name, value in changes.items()}
+    for name, what in KINDS.items():
+        if name in given:
+            craft = what.change(craft, given[name])
+    return craft
