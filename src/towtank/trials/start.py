@@ -11,10 +11,11 @@ from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.algebra import MATH
 from towtank.model.equations import Model
+from towtank.model.algebra import MATH
 from towtank.pilot.allocation import RUDDER_FIRST, allocation, share
 from towtank.pilot.design import design_pilot
-from towtank.pilot.helm import EXTRA, Helm
 from towtank.pilot.law import Pilot, schedule
+from towtank.pilot.orders import Orders
 from towtank.quantity import Quantity, si
 
 STEEPEST_TRIM = np.radians(30.0)
@@ -98,29 +99,37 @@ def ballasted(model: Model) -> Model:
 
 @dataclass(frozen=True)
 class Setting:
-    """What every trial starts from: speed [m/s], trim, state (12 + n_fins + 3,), helm at rest in trim, thrust [N].
+    """What every trial starts from.
 
-    ``convective`` is the time in which the craft travels its own length [s].
+    speed [m/s], trim.   state (12 + n,) : x y z, phi theta psi, u v w p q r, fins, as in ``STATE``.   memory (3,) : of the
+    steering, its trims [rad] and the integral of the guidance [m].   pilot : None in open loop.   thrust [N].
+    convective : time in which the craft travels its own length [s].
     """
 
     speed: float
     trim: Trim
     state: Array
-    helm: Helm
+    memory: tuple[float, float, float]
+    pilot: Pilot | None
     thrust: float
     convective: float
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What limits the trial, in words."""
-        pilot = self.helm.pilot.notes if self.helm.pilot else ()
+        pilot = self.pilot.notes if self.pilot else ()
         return pilot if self.trim.holds else (*pilot, f"Not trimmed: {self.trim.why}. The craft changes depth.")
+
+    def orders(self, **changes: float) -> Orders:
+        """Orders in trim, ``changes`` beside: the elevator at its trim, the pilot, if there is one, without an order."""
+        at_trim = Orders(piloted=1.0 if self.pilot else 0.0, elevator=self.trim.elevator)
+        return replace(at_trim, **changes)
 
 
 def setting(model: Model, speed: Quantity | None, pilot: Pilot | None = None, *, piloted: bool = True) -> Setting:
     """Start of a trial at ``speed`` (the craft's own by default), on a northerly course at depth 0.
 
-    A craft that flies ``piloted`` gets a pilot designed for this speed unless one is given.
+    A craft that flies ``piloted`` gets a pilot designed for this speed unless one is given; otherwise it has none.
 
     Raises
     ------
@@ -131,16 +140,14 @@ def setting(model: Model, speed: Quantity | None, pilot: Pilot | None = None, *,
     if U <= 0.0:
         raise InputError(f"speed {U:g} m/s: a free-running trial needs forward speed. Give a positive one.")
     trim = level_trim(model, U)
-    if piloted and pilot is None:
-        pilot = design_pilot(model, U)
+    pilot = (pilot or design_pilot(model, U)) if piloted else None
     fins = model.craft.mixing[:, 1] * trim.elevator if model.craft.fins else np.zeros(0)
-    extra = [0.0] * EXTRA
-    if pilot is not None:
-        # The elevator's trim carries what the pitch feedback asks for in level flight: the pilot starts at rest.
-        extra[1] = trim.elevator + schedule(pilot, trim.u, MATH) * pilot.pitch * trim.pitch
-    state = [0.0, 0.0, 0.0, 0.0, trim.pitch, 0.0, trim.u, 0.0, trim.w, 0.0, 0.0, 0.0, *fins, *extra]
-    helm = Helm(allocation(model.craft), pilot, elevator=trim.elevator)
-    return Setting(U, trim, np.array(state), helm, float(model.thrust(U)), model.craft.length / U)
+    # The elevator's trim carries what the pitch feedback asks for in level flight: the pilot starts at rest.
+    carried = trim.elevator + float(schedule(pilot, trim.u, MATH)) * pilot.pitch * trim.pitch if pilot else 0.0
+    state = [0.0, 0.0, 0.0, 0.0, trim.pitch, 0.0, trim.u, 0.0, trim.w, 0.0, 0.0, 0.0, *fins]
+    return Setting(
+        U, trim, np.array(state), (0.0, carried, 0.0), pilot, float(model.thrust(U)), model.craft.length / U
+    )
 
 
 def angle(value: Quantity, where: str, limit: float, reason: str) -> float:
