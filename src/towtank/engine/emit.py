@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from towtank.errors import TowtankError
+
 _OPERATIONS = {
     "OP_ASSIGN": "{0}",
     "OP_ADD": "{0} + {1}",
@@ -48,7 +50,7 @@ def c_function(function: Any) -> tuple[str, int]:
 
     Raises
     ------
-    NotImplementedError
+    TowtankError
         An operation this table does not have.
     """
     import casadi
@@ -74,7 +76,10 @@ def c_function(function: Any) -> tuple[str, int]:
         else:
             name = names.get(operation)
             if name is None:
-                raise NotImplementedError(f"{function.name()}: CasADi operation {operation} has no C text yet.")
+                raise TowtankError(
+                    f"engine: {function.name()} uses CasADi operation {operation}, which has no C text. Use +, -, *, / "
+                    "and the functions of ops only."
+                )
             flops += _FLOPS.get(name, 1)
             values = [held[j] for j in args]
             if name in ("OP_SIN", "OP_COS"):

@@ -42,7 +42,7 @@ class Flights:
     @property
     def finished(self) -> NDArray[np.bool_]:
         """True (N,) for the trajectories that went through all their legs."""
-        return self.ended == Ended.DONE
+        return np.asarray(self.ended == Ended.DONE)
 
     def leg(self, name: str) -> int:
         """Place of the leg called ``name``."""
@@ -76,7 +76,7 @@ class Flights:
                 return np.where(np.isnan(values).all(axis=1), np.nan, np.fmin.reduce(values, axis=1))
             if stat is Stat.HIGH:
                 return np.where(np.isnan(values).all(axis=1), np.nan, np.fmax.reduce(values, axis=1))
-            return np.nansum(values, axis=1)
+            return np.asarray(np.nansum(values, axis=1))
 
     def series(self, channel: str) -> Array:
         """Logged channel (N, S)."""

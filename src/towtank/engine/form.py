@@ -160,8 +160,9 @@ def _screw(form: Form, one: Any, row: Any) -> Screw:
     from towtank.model.algebra import Table
 
     knots = row("screw_knot", form.rows)
-    tables = {}
+    tables: dict[str, Any] = {}
     for word in ("kt", "kq"):
         first, *slopes = row(f"screw_{word}", form.rows)
         tables[word] = Table(knots, first, tuple(slopes))
-    return Screw(**{name: one(f"screw_{name}") for name in _SCREW}, **tables)
+    numbers: dict[str, Any] = {name: one(f"screw_{name}") for name in _SCREW}
+    return Screw(**numbers, **tables)

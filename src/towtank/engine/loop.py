@@ -34,7 +34,22 @@ _FLOOR = 1e-30
 
 def states(fins: int) -> tuple[str, ...]:
     """Names of the state."""
-    return ("x", "y", "z", "e0", "e1", "e2", "e3", "u", "v", "w", "p", "q", "r", *(f"delta{i + 1}" for i in range(fins)))
+    return (
+        "x",
+        "y",
+        "z",
+        "e0",
+        "e1",
+        "e2",
+        "e3",
+        "u",
+        "v",
+        "w",
+        "p",
+        "q",
+        "r",
+        *(f"delta{i + 1}" for i in range(fins)),
+    )
 
 
 def channels(fins: int) -> tuple[str, ...]:

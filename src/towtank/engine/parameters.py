@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.engine.form import ADDED, BODY, DAMPING, Form
 from towtank.errors import InputError
@@ -12,6 +13,9 @@ from towtank.frames import Array
 from towtank.model.equations import STILL, Constants, Model
 from towtank.model.rigid_body import Body, mass_matrix
 from towtank.pilot.law import GAINS, Pilot
+
+Places = NDArray[np.int64]
+"""Places in the vector of parameters."""
 
 MASS = (*BODY, *ADDED)
 """Parameters that change the mass matrix or may: those for which its inverse must be taken again."""
@@ -75,7 +79,7 @@ def _screw(form: Form, k: Constants) -> dict[str, float]:
     return out
 
 
-def varied(form: Form, base: Array, columns: Mapping[str, Array]) -> tuple[Array, Array]:
+def varied(form: Form, base: Array, columns: Mapping[str, Array]) -> tuple[Places, Array]:
     """Places (m,) and values (N, m) of the parameters that differ between N trajectories.
 
     columns : name -> (N,).   When a mass, an inertia, a CG or an added mass is among them, the inverse of the mass
@@ -118,7 +122,7 @@ def _mass_matrices(form: Form, base: Array, table: Mapping[str, Array], count: i
     smallest = np.linalg.eigvalsh(0.5 * (mass + mass.transpose(0, 2, 1))).min()
     if not smallest > 0.0:
         raise InputError(
-            f"ensemble: a mass matrix M_RB - M_A is not positive definite (smallest eigenvalue {smallest:.3g}). The spread "
-            "of the added masses, the mass or the CG is too large for this craft: narrow it."
+            f"ensemble: a mass matrix M_RB - M_A is not positive definite (smallest eigenvalue {smallest:.3g}). The "
+            "spread of the added masses, the mass or the CG is too large for this craft: narrow it."
         )
     return np.asarray(mass)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -55,7 +55,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Gauge:
-    """Watch ``channel`` (its magnitude if ``absolute``) in every leg: ``Stat``, times above and crossings of ``level``."""
+    """Watch ``channel`` (its magnitude if ``absolute``) in every leg; ``level`` is for times above and crossings."""
 
     channel: str
     level: float = 0.0
@@ -89,7 +89,7 @@ class Clock:
     def __post_init__(self) -> None:
         if not (self.tick > 0.0 and np.isfinite(self.tick) and self.steps >= 1):
             raise InputError(
-                f"clock: tick {self.tick:g} s with {self.steps} steps. Give a positive control period and one step or more."
+                f"clock: tick {self.tick:g} s with {self.steps} steps. Give a positive period and one step or more."
             )
 
 
@@ -99,16 +99,6 @@ class Log:
 
     names: tuple[str, ...] = ()
     every: int = 1
-
-
-@dataclass(frozen=True)
-class Task:
-    """A run in numbers: leg table (legs, 5 + orders), gauge table (G, 3), logged channels (C,)."""
-
-    legs: Array
-    gauges: Array
-    logged: tuple[str, ...] = ()
-    places: tuple[int, ...] = field(default=())
 
 
 def leg_table(legs: Sequence[Leg], fins: int) -> Array:

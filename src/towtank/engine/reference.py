@@ -143,7 +143,7 @@ class _Lanes:
         """Distance (N,) of the event channel from its level."""
         table = np.stack([self._row(v) for v in y])
         value = table[np.maximum(self.head[:, 1], 0.0).astype(int), np.arange(self.count)]
-        return np.where(self.head[:, 2] != 0.0, np.abs(value), value) - self.head[:, 3]
+        return np.asarray(np.where(self.head[:, 2] != 0.0, np.abs(value), value) - self.head[:, 3])
 
     def begin(self, lane: int) -> None:
         """Begin the leg the lane stands at, or end the lane when there is none."""
@@ -219,7 +219,9 @@ class _Lanes:
             s[Stat.FIRST] = np.where(crossed & np.isnan(s[Stat.FIRST]), when, s[Stat.FIRST])
             s[Stat.LAST] = np.where(crossed, when, s[Stat.LAST])
 
-    def land(self, x0: list[Any], y0: list[Any], h: Any, c: Any, e0: Array, e1: Array) -> tuple[list[Any], list[Any], Any]:
+    def land(
+        self, x0: list[Any], y0: list[Any], h: Any, c: Any, e0: Array, e1: Array
+    ) -> tuple[list[Any], list[Any], Any]:
         """Shorten ``h`` of the lanes in ``c`` to their event: regula falsi (Illinois) on whole integrations."""
         triggered, whole = self._row(c) != 0.0, self._row(h)
         low, high, at_low, at_high, last = np.zeros(self.count), whole, e0, e1, np.zeros(self.count)
@@ -245,7 +247,7 @@ class _Lanes:
         """Lanes at the end of a leg: mark, next leg, new command."""
         changed = np.zeros(self.count)
         live, t, end = self._row(self.live), self._row(self.t), self._row(self.end)
-        for lane in np.flatnonzero((live != 0.0) & ((self._row(c) != 0.0) | (t >= end - EPS))):
+        for lane in np.flatnonzero((live != 0.0) & ((self._row(c) != 0.0) | (t >= end - EPS))).tolist():
             by_event = bool(self._row(c)[lane])
             required = self.head[lane, 4] != 0.0
             self.finish(lane, BY_EVENT if by_event else BY_TIME)
@@ -262,7 +264,7 @@ class _Lanes:
             y = self.look(self.x, self.y)
             self.y = [self.pick(mask, a, b) for a, b in zip(y, self.y, strict=True)]
             self.order(mask)
-            for lane in np.flatnonzero(changed):
+            for lane in np.flatnonzero(changed).tolist():
                 self.fresh(lane)
 
     def tick(self, until: float) -> None:
@@ -304,7 +306,7 @@ class _Lanes:
         lost = ~sound & (self._row(self.live) != 0.0)
         if not lost.any():
             return y1, h, c
-        for lane in np.flatnonzero(lost):
+        for lane in np.flatnonzero(lost).tolist():
             self.close(lane, Ended.TOO_FAST if speed[lane] < 1e300 else Ended.NOT_FINITE)
         mask = self._value(lost.astype(float))
         self.x = [self.pick(mask, a, b) for a, b in zip(x0, self.x, strict=True)]

@@ -12,7 +12,7 @@ from towtank.engine.flights import Flights
 from towtank.engine.form import Form, form_of
 from towtank.engine.library import Library, library
 from towtank.engine.loop import KINEMATIC, MEMORY, channels
-from towtank.engine.parameters import parameters, varied
+from towtank.engine.parameters import Places, parameters, varied
 from towtank.engine.plan import Clock, Ended, Gauge, Leg, Log, Stat, gauge_table, leg_table, place
 from towtank.errors import InputError
 from towtank.frames import Array
@@ -29,12 +29,12 @@ class Arrays:
     """The arrays of a run, in and out, as the loop wants them; N trajectories."""
 
     common: Array
-    which: Array
+    which: Places
     varied: Array
     start: Array
     plan: Array
     gauge: Array
-    channel: Array
+    channel: Places
     log: Array
     stats: Array
     marks: Array
@@ -54,7 +54,7 @@ class Arrays:
 class Ensemble:
     """What differs between N trajectories; what is not given is shared.
 
-    parameters : name -> (N,), as in ``Form.names``: derivatives, ``m``, ``xG``, ``zG``, ``current_north``, ``thrust``, ...
+    parameters : name -> (N,), as in ``Form.names``: derivatives, ``m``, ``zG``, ``current_north``, ``thrust``, ...
     start (N, 13 + n + 3) : state and memory.   orders : order name -> (N,) or (N, legs).
     """
 
@@ -87,8 +87,8 @@ def fly(
     Parameters
     ----------
     start : (13 + n + 3,) state and memory of the steering, from ``towtank.engine.start.at``.
-    thrust : [N].   current : (3,) [m/s, NED].   clock : control period and steps.   log : what is kept over time, nothing
-        when left out.   gauges : what is watched in every leg.   ensemble : what differs between trajectories.
+    thrust : [N].   current : (3,) [m/s, NED].   clock : control period and steps.   log : what is kept over time,
+        nothing when left out.   gauges : what is watched in every leg.   ensemble : what differs between trajectories.
     threads : that share the trajectories; all cores when left out.
 
     An interruption (Ctrl-C) keeps the trajectories that are finished; the others are marked ``Ended.STOPPED``.
@@ -99,7 +99,9 @@ def fly(
         A start, leg, gauge or parameter that cannot be used.
     """
     form = form_of(model)
-    arrays = _arrays(form, model, pilot or NO_PILOT, start, legs, thrust, current, clock or Clock(), log, gauges, ensemble)
+    arrays = _arrays(
+        form, model, pilot or NO_PILOT, start, legs, thrust, current, clock or Clock(), log, gauges, ensemble
+    )
     compiled = library(form)
     if compiled is not None:
         from towtank.engine.threads import run_threads
@@ -119,7 +121,8 @@ def _arrays(
     count, fins = ensemble.count, form.fins
     names = channels(fins)
     common = parameters(form, model, pilot, thrust, current)
-    which, values = np.zeros(0, np.int64), np.zeros((count, 0))
+    which: Places = np.zeros(0, dtype=np.int64)
+    values: Array = np.zeros((count, 0))
     if ensemble.parameters:
         which, values = varied(form, common, ensemble.parameters)
     begin = _start(model, form, start if ensemble.start is None else ensemble.start)
@@ -129,13 +132,13 @@ def _arrays(
     for what, rows in (("parameters", len(values)), ("start", len(begin) if begin.ndim == 2 else count)):
         if rows != count:
             raise InputError(f"ensemble of {count}: {what} hold {rows} trajectories. Give one row for each.")
-    logged = np.array([place(name, fins) for name in (log.names or names)] if log else [], dtype=np.int64)
+    logged: Places = np.array([place(name, fins) for name in (log.names or names)] if log else [], dtype=np.int64)
     longest = float(plan[..., 0].sum(axis=-1).max())
     samples = math.floor(longest / (clock.tick * log.every) + 1e-9) + 1 if log else 0
     speed = np.linalg.norm(begin[..., 7:10], axis=-1).max()
     return Arrays(
-        common=common, which=which, varied=values, start=begin, plan=plan, gauge=gauge_table(gauges, fins), channel=logged,
-        log=np.full((count, samples, len(logged)), np.nan),
+        common=common, which=which, varied=values, start=begin, plan=plan, gauge=gauge_table(gauges, fins),
+        channel=logged, log=np.full((count, samples, len(logged)), np.nan),
         stats=np.full((count, len(legs), len(gauges), len(Stat)), np.nan),
         marks=np.full((count, len(legs), 2 + len(names)), np.nan),
         end=np.full((count, KINEMATIC + fins + len(MEMORY)), np.nan),
@@ -151,8 +154,8 @@ def _start(model: Model, form: Form, start: Sequence[float] | Array) -> Array:
     size = KINEMATIC + have + len(MEMORY)
     if given.shape[-1] != size or given.ndim > 2 or not np.all(np.isfinite(given)):
         raise InputError(
-            f"run of {model.craft.name}: the start needs {size} finite numbers (13 of the craft with its quaternion, {have} "
-            f"fin angles, 3 of the steering), got shape {given.shape}. Build it with towtank.engine.start.at."
+            f"run of {model.craft.name}: the start needs {size} finite numbers (13 of the craft with its quaternion, "
+            f"{have} fin angles, 3 of the steering), got shape {given.shape}. Build it with towtank.engine.start.at."
         )
     none = np.zeros((*given.shape[:-1], form.fins - have))
     return np.ascontiguousarray(np.concatenate([given[..., : size - 3], none, given[..., size - 3 :]], axis=-1))
@@ -182,7 +185,7 @@ def _flights(
         gauges=tuple(gauges),
         names=names,
         logged=(log.names or names) if log else (),
-        time=a.clock.tick * a.every * np.arange(a.log.shape[1]),
+        time=np.asarray(a.clock.tick * a.every * np.arange(a.log.shape[1])),
         log=a.log,
         mark_time=a.marks[:, :, 0],
         by_event=a.marks[:, :, 1] == 1.0,
@@ -193,5 +196,3 @@ def _flights(
         state=a.end[:, real],
         path="numpy" if compiled is None else compiled.target.name,
     )
-
-

@@ -5,12 +5,13 @@ from __future__ import annotations
 import ctypes
 import threading
 from queue import Empty, SimpleQueue
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.engine.library import Library, Task
 from towtank.engine.run import Arrays
-from towtank.frames import Array
 from towtank.parallel import cores
 from towtank.progress import Progress
 
@@ -72,13 +73,14 @@ def _watch(workers: list[threading.Thread], done: SimpleQueue[int], progress: Pr
 
 
 def _task(a: Arrays, first: int, last: int, stop: ctypes.c_int32) -> Task:
-    def address(array: Array) -> int | None:
+    def address(array: NDArray[Any]) -> int | None:
         return array.ctypes.data if array.size else None
 
     return Task(
         first=first, last=last, common=address(a.common), varying=len(a.which), which=address(a.which),
         varied=address(a.varied), start=address(a.start), start_stride=a.start.shape[-1] if a.start.ndim == 2 else 0,
-        legs=a.plan.shape[-2], plan=address(a.plan), plan_stride=int(np.prod(a.plan.shape[1:])) if a.plan.ndim == 3 else 0,
+        legs=a.plan.shape[-2], plan=address(a.plan),
+        plan_stride=int(np.prod(a.plan.shape[1:])) if a.plan.ndim == 3 else 0,
         tick=a.clock.tick, steps=a.clock.steps, fastest=a.fastest, gauges=len(a.gauge), gauge=address(a.gauge),
         channels=len(a.channel), channel=address(a.channel), every=a.every, samples=a.log.shape[1], log=address(a.log),
         stats=address(a.stats), marks=address(a.marks), end=address(a.end), status=address(a.status),

@@ -55,7 +55,9 @@ def traced(form: Form) -> Traced:
 
     n, ops = form.fins, casadi_ops()
     sizes = {"p": len(form.names), "x": len(states(n)), "asked": n, "orders": len(ORDERS), "memory": len(MEMORY)}
-    v = SimpleNamespace(**{name: ca.SX.sym(name, size) for name, size in sizes.items()}, seen=ca.SX.sym("y", observed(n)))
+    v = SimpleNamespace(
+        **{name: ca.SX.sym(name, size) for name, size in sizes.items()}, seen=ca.SX.sym("y", observed(n))
+    )
     listed = {name: [value[i] for i in range(value.numel())] for name, value in vars(v).items()}
     s = system(form, listed["p"])
     rates = ca.vertcat(*dynamics(s, listed["x"], listed["asked"], ops))
@@ -79,8 +81,8 @@ def slopes_header(trace: Traced) -> str:
     """C text ``slopes.h``: vector-Jacobian products and sparse Jacobians of the three functions.
 
     The rates are direct + W load, with W the inverse of the mass matrix M. Derivatives are with respect to the
-    parameters before W; what a change of mass, CG, inertia or added mass does through W is part of them: from M a = load
-    follows da = W (dload - dM a), so the load of the derivatives is ``balanced`` = load - M a with a held.
+    parameters before W; what a change of mass, CG, inertia or added mass does through W is part of them: M a = load
+    gives da = W (dload - dM a), so the load of the derivatives is ``balanced`` = load - M a with a held.
     """
     import casadi as ca
 

@@ -41,7 +41,7 @@ COMMON = (ROLL, PITCH, SPEED, FIN_SQUARE, FIN_LARGEST, FIN_USE)
 class Ready:
     """A trial ready to fly.
 
-    name, kind, loop : of the trajectory.   setting : start.   legs : what is flown.   gauges : watched beside ``COMMON``.
+    name, kind, loop : of the trajectory.   setting : start.   legs : flown.   gauges : watched beside ``COMMON``.
     interval : between samples of the record [s].   current (3,) [m/s, NED].
     read : flights of N craft -> the trial's own indices.   status : flights of one craft -> why its numbers are not
     complete, or None.   curves : flights of one craft -> plain series that belong to the trial.
@@ -71,7 +71,7 @@ def clock_of(model: Model, speed: float) -> Clock:
 
 
 def fly_ready(model: Model, trial: Ready, ensemble: Ensemble = ONE, *, record: bool = True, **options: Any) -> Flights:
-    """Fly ``trial``. ``record`` keeps all channels at its interval; other ``options`` go to ``towtank.engine.run.fly``."""
+    """Fly ``trial``. ``record`` keeps all channels at its interval; ``options`` go to ``towtank.engine.run.fly``."""
     clock = clock_of(model, trial.setting.speed)
     state = trial.setting.state if trial.start is None else trial.start
     log = Log(every=max(1, round(trial.interval / clock.tick))) if record else None
@@ -93,7 +93,8 @@ def run_trial(model: Model, trial: Ready) -> Trajectory:
     kept = np.flatnonzero(~np.isnan(flights.log[0, :, 0]))
 
     def channel(*names: str) -> Array:
-        return np.stack([flights.series(name)[0, kept] for name in names], axis=-1) if names else np.zeros((len(kept), 0))
+        columns = [flights.series(name)[0, kept] for name in names]
+        return np.stack(columns, axis=-1) if columns else np.zeros((len(kept), 0))
 
     time = flights.time[kept]
     leg = np.minimum(np.searchsorted(flights.mark_time[0][: _flown(flights)], time, side="right"), len(trial.legs) - 1)
@@ -162,8 +163,8 @@ def _status(trial: Ready, flights: Flights) -> str:
 def _provenance(model: Model, trial: Ready, flights: Flights) -> dict[str, Any]:
     s, clock = trial.setting, clock_of(model, trial.setting.speed)
     marks = [
-        {"leg": leg.name, "time": float(flights.mark_time[0, i]), "ended": "event" if flights.by_event[0, i] else "time"}
-        for i, leg in enumerate(trial.legs)
+        {"leg": trial.legs[i].name, "time": float(flights.mark_time[0, i]), "ended": ended}
+        for i, ended in enumerate(np.where(flights.by_event[0], "event", "time").tolist())
         if not np.isnan(flights.mark_time[0, i])
     ]
     return provenance(

@@ -11,7 +11,6 @@ from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.algebra import MATH
 from towtank.model.equations import Model
-from towtank.model.algebra import MATH
 from towtank.pilot.allocation import RUDDER_FIRST, allocation, share
 from towtank.pilot.design import design_pilot
 from towtank.pilot.law import Pilot, schedule
@@ -101,9 +100,9 @@ def ballasted(model: Model) -> Model:
 class Setting:
     """What every trial starts from.
 
-    speed [m/s], trim.   state (12 + n,) : x y z, phi theta psi, u v w p q r, fins, as in ``STATE``.   memory (3,) : of the
-    steering, its trims [rad] and the integral of the guidance [m].   pilot : None in open loop.   thrust [N].
-    convective : time in which the craft travels its own length [s].
+    speed [m/s], trim.   state (12 + n,) : x y z, phi theta psi, u v w p q r, fins, as in ``STATE``.
+    memory (3,) : of the steering, its trims [rad] and the integral of the guidance [m].   pilot : None in open loop.
+    thrust [N].   convective : time in which the craft travels its own length [s].
     """
 
     speed: float
@@ -121,7 +120,7 @@ class Setting:
         return pilot if self.trim.holds else (*pilot, f"Not trimmed: {self.trim.why}. The craft changes depth.")
 
     def orders(self, **changes: float) -> Orders:
-        """Orders in trim, ``changes`` beside: the elevator at its trim, the pilot, if there is one, without an order."""
+        """Orders in trim, with ``changes``: the elevator at its trim; the pilot, if there is one, without an order."""
         at_trim = Orders(piloted=1.0 if self.pilot else 0.0, elevator=self.trim.elevator)
         return replace(at_trim, **changes)
 
@@ -145,9 +144,7 @@ def setting(model: Model, speed: Quantity | None, pilot: Pilot | None = None, *,
     # The elevator's trim carries what the pitch feedback asks for in level flight: the pilot starts at rest.
     carried = trim.elevator + float(schedule(pilot, trim.u, MATH)) * pilot.pitch * trim.pitch if pilot else 0.0
     state = [0.0, 0.0, 0.0, 0.0, trim.pitch, 0.0, trim.u, 0.0, trim.w, 0.0, 0.0, 0.0, *fins]
-    return Setting(
-        U, trim, np.array(state), (0.0, carried, 0.0), pilot, float(model.thrust(U)), model.craft.length / U
-    )
+    return Setting(U, trim, np.array(state), (0.0, carried, 0.0), pilot, float(model.thrust(U)), model.craft.length / U)
 
 
 def angle(value: Quantity, where: str, limit: float, reason: str) -> float:
