@@ -16,7 +16,7 @@ from towtank.parallel import cores, prepare
 
 if TYPE_CHECKING:
     from towtank.sweep.sweep import Sweep
-    from towtank.sweep.table import SweepTable
+    from towtank.sweep.table import Row, SweepTable
 
 SHOWN = ("G_h", "G_v", "P_stable_h", "turning_circle.tactical_diameter", "zigzag.first_overshoot")
 """Columns printed; sweep.csv has all."""
@@ -156,17 +156,22 @@ def _tell(reply: Reply, table: SweepTable) -> None:
         {"at": list(row.at), **{name: row.values.get(name) for name in shown}} for row in table.rows
     ]
     reply.say(f"{len(table.rows)} points, {table.level}: {', '.join(axis.name for axis in table.axes)}")
-    heads = [axis.name for axis in table.axes] + [name.rpartition(".")[2] for name in shown]
+    heads = [axis.label for axis in table.axes] + [name.rpartition(".")[2] for name in shown]
     reply.say("  " + "  ".join(f"{head:>12}" for head in heads))
     for row in table.rows[:LINES]:
-        numbers = [*row.at, *(row.values.get(name, float("nan")) for name in shown)]
+        numbers = [*_shown(table, row), *(row.values.get(name, float("nan")) for name in shown)]
         reply.say("  " + "  ".join(f"{n:{max(len(h), 12)}.5g}" for n, h in zip(numbers, heads, strict=True)))
     if len(table.rows) > LINES:
         reply.say(f"  and {len(table.rows) - LINES} more in {reply.files['table']}")
     for row in table.failed[:LINES]:
-        where = ", ".join(f"{axis.name} {value:g}" for axis, value in zip(table.axes, row.at, strict=True))
+        where = ", ".join(axis.words(value) for axis, value in zip(table.axes, row.at, strict=True))
         reply.log(f"  not done: {where}: {row.failed}")
     for note in dict.fromkeys(note for row in table.rows for note in row.notes if note.startswith("Not trimmed")):
         reply.log(f"  note: {note}")
     if len(table.failed) == len(table.rows):
         reply.fail(3, f"none of the {len(table.rows)} points could be carried out; the reasons are above and on file.")
+
+
+def _shown(table: SweepTable, row: Row) -> list[float]:
+    """Where a point lies, as printed."""
+    return [axis.shown[0][axis.values.index(value)] for axis, value in zip(table.axes, row.at, strict=True)]

@@ -59,7 +59,7 @@ def sweep_sheet(table: SweepTable, columns: Sequence[str] = ()) -> Figure:
     FigureCanvasAgg(figure)
     for i, name in enumerate(drawn):
         share = 1.0 / len(drawn)
-        sweep_column(table, name, figure.add_axes(((i + 0.16) * share, 0.14, 0.80 * share, 0.66)))
+        sweep_column(table, name, figure.add_axes(((i + 0.16) * share, 0.14, 0.80 * share, 0.70)))
     return figure
 
 
@@ -74,7 +74,7 @@ def _drawn(table: SweepTable, column: str) -> tuple[Array, list[str]]:
         base = table.base[i] if np.isfinite(table.base[i]) else axis.values[0]
         nearest = int(np.argmin(np.abs(np.array(axis.values) - base)))
         values = np.take(values, nearest, axis=i)
-        held.insert(0, f"{axis.name} held at {_shown(table, i)[nearest]:.6g} {_unit(table, i)}".rstrip())
+        held.insert(0, f"at {axis.words(axis.values[nearest])}")
     return values, held
 
 
@@ -86,21 +86,6 @@ def _banded(table: SweepTable, column: str) -> bool:
     return len(table.axes) == 1 and f"{column}_low" in table.columns
 
 
-def _unit(table: SweepTable, axis: int) -> str:
-    return "deg" if table.axes[axis].unit == "rad" else table.axes[axis].unit
-
-
-def _shown(table: SweepTable, axis: int) -> Array:
-    """Values of an axis as they are printed: angles in degrees."""
-    values = np.array(table.axes[axis].values)
-    return np.degrees(values) if table.axes[axis].unit == "rad" else values
-
-
-def _label(table: SweepTable, axis: int) -> str:
-    unit = _unit(table, axis)
-    return f"{table.axes[axis].name} [{unit}]" if unit else table.axes[axis].name
-
-
 def _column_label(table: SweepTable, column: str) -> str:
     unit = table.columns[column]
     name = column.rpartition(".")[2].replace("_", " ") if "." in column else column
@@ -109,7 +94,7 @@ def _column_label(table: SweepTable, column: str) -> str:
 
 def _lines(ax: Axes, table: SweepTable, column: str, values: Array, order: Sequence[int]) -> None:
     along = order[0]
-    x = _shown(table, along)
+    x = np.array(table.axes[along].shown[0])
     rising = np.argsort(x)
     if _banded(table, column):
         low, high = table.column(f"{column}_low"), table.column(f"{column}_high")
@@ -119,22 +104,21 @@ def _lines(ax: Axes, table: SweepTable, column: str, values: Array, order: Seque
         label = None
         if values.ndim == 2:
             other = order[1]
-            label = f"{table.axes[other].name} {_shown(table, other)[i]:.6g} {_unit(table, other)}".rstrip()
-        ax.plot(
-            x[rising], line[rising], "o-", color=PALETTE[i % len(PALETTE)], markersize=3, linewidth=1.2, label=label
-        )
-        missing = ~np.isfinite(line)
-        ax.plot(x[missing], np.full(missing.sum(), 0.02), "x", color=BAD, transform=ax.get_xaxis_transform())
+            label = table.axes[other].words(table.axes[other].values[i])
+        colour, missing = PALETTE[i % len(PALETTE)], ~np.isfinite(line)
+        ax.plot(x[rising], line[rising], "o-", color=colour, markersize=3, linewidth=1.2, label=label)
+        height = np.full(missing.sum(), 0.02 + 0.03 * i)
+        ax.plot(x[missing], height, "x", color=colour, markersize=4, transform=ax.get_xaxis_transform())
     if np.isfinite(table.base[along]):
         base = np.degrees(table.base[along]) if table.axes[along].unit == "rad" else table.base[along]
         if x.min() <= base <= x.max():
             ax.axvline(base, color=GREY, linewidth=0.7, linestyle=":")
-    frame(ax, _label(table, along), _column_label(table, column), zero=column in ZERO_MATTERS)
+    frame(ax, table.axes[along].label, _column_label(table, column), zero=column in ZERO_MATTERS)
     legend(ax)
 
 
 def _contours(ax: Axes, table: SweepTable, column: str, values: Array) -> None:
-    x, y = _shown(table, 0), _shown(table, 1)
+    x, y = (np.array(axis.shown[0]) for axis in table.axes[:2])
     i, j = np.argsort(x), np.argsort(y)
     X, Y = np.meshgrid(x[i], y[j], indexing="ij")
     Z = np.ma.masked_invalid(values[np.ix_(i, j)])
@@ -151,4 +135,5 @@ def _contours(ax: Axes, table: SweepTable, column: str, values: Array) -> None:
         base = [np.degrees(b) if a.unit == "rad" else b for a, b in zip(table.axes, table.base[:2], strict=False)]
         if x.min() <= base[0] <= x.max() and y.min() <= base[1] <= y.max():
             ax.plot(*base, "s", markerfacecolor="none", markeredgecolor=INK, markersize=7)
-    frame(ax, _label(table, 0), _label(table, 1), zero=False)
+    frame(ax, table.axes[0].label, table.axes[1].label, zero=False)
+    ax.margins(0.03)

@@ -30,6 +30,22 @@ class Axis:
         """Unit of the values."""
         return kind(self.name).unit
 
+    @property
+    def shown(self) -> tuple[tuple[float, ...], str]:
+        """Values and unit as they are printed: angles in degrees."""
+        degrees = self.unit == "rad"
+        return (tuple(map(math.degrees, self.values)), "deg") if degrees else (self.values, self.unit)
+
+    @property
+    def label(self) -> str:
+        """Name with the unit as printed."""
+        unit = self.shown[1]
+        return f"{self.name} [{unit}]" if unit else self.name
+
+    def words(self, value: float) -> str:
+        """Name and one value [SI] as printed."""
+        return f"{self.name} {math.degrees(value) if self.unit == 'rad' else value:.6g} {self.shown[1]}".rstrip()
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -124,6 +140,7 @@ def axis_of(craft: Craft, text: str) -> Axis:
             f"{name}={values}: a range is first:last:number with at least 2 values, such as 0.8:1.4:4. {what.meaning}."
         )
     first, last, count = number(craft, name, parts[0]), number(craft, name, parts[1]), int(parts[2])
-    # Both ends exactly, and the values between as a person would write them.
-    between = [float(f"{first + (last - first) * i / (count - 1):.12g}") for i in range(1, count - 1)]
+    # Both ends exactly, and the values between as a person would write them: angles in degrees.
+    one = math.pi / 180.0 if what.unit == "rad" else 1.0
+    between = [one * float(f"{(first + (last - first) * i / (count - 1)) / one:.12g}") for i in range(1, count - 1)]
     return Axis(name, (first, *between, last))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from towtank.craft.craft import Craft, Mass
+from towtank.craft.integrals import centre_of_buoyancy
 from towtank.craft.mass import as_rows, move_inertia
 from towtank.errors import CraftError, InputError
 from towtank.quantity import Quantity, si
@@ -33,17 +34,31 @@ class Kind:
     in_lengths: bool = False
 
 
-def _with_cg(craft: Craft, axis: int, value: float) -> Craft:
-    """The CG moved along one axis, the inertia about it kept."""
-    old = craft.mass
-    if value == old.cg[axis]:
+def _moved_cg(mass: Mass, x: float, y: float, z: float) -> Mass:
+    """``mass`` with its CG at another point, the inertia about the CG kept."""
+    if (x, y, z) == mass.cg:
+        return mass
+    inertia = np.array(mass.inertia) - move_inertia(np.zeros((3, 3)), mass.mass, np.array(mass.cg))
+    return replace(mass, cg=(x, y, z), inertia=as_rows(move_inertia(inertia, mass.mass, np.array([x, y, z]))))
+
+
+def _in_trim(craft: Craft, before: Craft) -> Craft:
+    """``craft`` with the CG moved along and across as the centre of buoyancy moved since ``before``.
+
+    Ballast shifted in the hull keeps the craft floating as it did; otherwise a fin's volume would change its trim.
+    """
+    if craft.fins == before.fins:
         return craft
-    point = [*old.cg]
+    was, now = (centre_of_buoyancy(c.profile, c.fins) for c in (before, craft))
+    x, y, z = craft.mass.cg
+    return replace(craft, mass=_moved_cg(craft.mass, x - (now[1] - was[1]), y + (now[2] - was[2]), z))
+
+
+def _with_cg(craft: Craft, axis: int, value: float) -> Craft:
+    """The CG moved along one axis."""
+    point = [*craft.mass.cg]
     point[axis] = value
-    nothing = np.zeros((3, 3))
-    inertia = np.array(old.inertia) - move_inertia(nothing, old.mass, np.array(old.cg))
-    moved = move_inertia(inertia, old.mass, np.array(point))
-    mass = replace(old, cg=(point[0], point[1], point[2]), inertia=as_rows(moved))
+    mass = _moved_cg(craft.mass, point[0], point[1], point[2])
     station, aside = craft.origin_from_nose - point[0], math.hypot(point[1], point[2])
     radius = float(craft.profile.radius(np.array(station))) if 0.0 <= station <= craft.length else 0.0
     if aside > radius or radius == 0.0:
@@ -125,7 +140,7 @@ KINDS: dict[str, Kind] = {
         Kind("speed", "m/s", "reference speed of tests and trials", lambda c: c.speed, _with_speed),
     )
 }  # fmt: skip
-"""What can be varied, in the order in which the changes of one variant are made."""
+"""What can be varied, in the order in which the changes of one variant are made: the fins first."""
 
 _ABSENT = {
     "strakes": "a craft file knows no strakes yet: hull and fins are all that the tank sees",
@@ -173,7 +188,9 @@ def vary(craft: Craft, **changes: Quantity) -> Craft:
         lengths of the craft, ``"0.95 L"``. The order of the arguments has no effect.
 
     The body origin, the hull and the displaced mass stay, so that all variants are compared about one point and at
-    one buoyancy; larger fins move the centre of buoyancy by their own small volume. The craft given is unchanged.
+    one buoyancy. Where other fins move the centre of buoyancy, the CG is moved along with it, as shifted ballast would
+    do, so that the craft floats as before; ``cg_x`` and ``cg_z`` are positions and come after. The craft given is
+    unchanged.
 
     Raises
     ------
@@ -183,7 +200,10 @@ def vary(craft: Craft, **changes: Quantity) -> Craft:
         A variant that cannot be built: fins off the hull, a CG outside it, no fins or no X fins to vary, too heavy.
     """
     given = {name: number(craft, name, value) for name, value in changes.items()}
-    for name, what in KINDS.items():
-        if name in given:
-            craft = what.change(craft, given[name])
+    before = craft
+    for name in (name for name in KINDS if name in given and name.startswith("fin_")):
+        craft = KINDS[name].change(craft, given[name])
+    craft = _in_trim(craft, before)
+    for name in (name for name in KINDS if name in given and not name.startswith("fin_")):
+        craft = KINDS[name].change(craft, given[name])
     return craft
