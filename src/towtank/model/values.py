@@ -32,6 +32,11 @@ _SHIFTS: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = (
 _BLOCKS = ({"X", "Z", "M", "u", "w", "q"}, {"Y", "K", "N", "v", "p", "r"})
 
 
+def shares(term: str) -> tuple[tuple[str, float], ...]:
+    """Added masses and factors whose sum is the lumped ``term`` less the split one; empty for most terms."""
+    return dict(_SHIFTS).get(term, ())
+
+
 def values_of(derivatives: Derivatives) -> dict[str, float]:
     """Term -> value, after a check of names, numbers and variant.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
+from towtank.model.rigid_body import Body, mass_matrix
 from towtank.model.values import to_variant
 from towtank.symbols import LOADS, RATES
 
@@ -70,14 +71,16 @@ def samples(model: Model, count: int = SAMPLES, slopes: str = "origin", seed: in
     return out
 
 
-def horizontal_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Array:
+def horizontal_matrix(model: Model, v: Mapping[str, Array], speed: float, body: Body | None = None) -> Array:
     """A (n, 2, 2) of d(v, r)/dt for ``v`` = term -> (n,), at ``speed`` [m/s].
+
+    body : the model's own when left out; its entries may be (n,).
 
     Source     fossen2021, ch. 6: linear sway-yaw equations; damping in the lumped variant.
     Departure  The mass matrix is the whole one, so that a CG off the axis has its part.
     Valid      Small motions, fins at rest, no roll.
     """
-    b, get = model.constants.body, _getter(v)
+    b, get = body or model.constants.body, _getter(v)
     zero = np.zeros(len(get("Yuv")))
     D = speed * _matrix(
         [
@@ -89,17 +92,17 @@ def horizontal_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Arr
             [get("Nuv"), get("Nur") - b.m * b.xG],
         ]
     )
-    return np.asarray(np.linalg.solve(_masses(model, v), D)[:, [1, 5], :])
+    return np.asarray(np.linalg.solve(_masses(b, v), D)[:, [1, 5], :])
 
 
-def vertical_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Array:
-    """A (n, 3, 3) of d(w, q, theta)/dt for ``v`` = term -> (n,), at ``speed`` [m/s].
+def vertical_matrix(model: Model, v: Mapping[str, Array], speed: float, body: Body | None = None) -> Array:
+    """A (n, 3, 3) of d(w, q, theta)/dt for ``v`` = term -> (n,), at ``speed`` [m/s]; body as above.
 
     Source     fossen2021, ch. 8: linear heave-pitch equations with the righting moment.
     Departure  As ``horizontal_matrix``.
     Valid      Small motions about level flight at constant speed, fins at rest.
     """
-    b, get = model.constants.body, _getter(v)
+    b, get = body or model.constants.body, _getter(v)
     zero = np.zeros(len(get("Zuw")))
     stiffness = b.g * (b.m * b.zG - b.b * b.zB)
     D = _matrix(
@@ -113,30 +116,31 @@ def vertical_matrix(model: Model, v: Mapping[str, Array], speed: float) -> Array
         ]
     )
     A = np.zeros((len(zero), 3, 3))
-    A[:, :2] = np.linalg.solve(_masses(model, v), D)[:, [2, 4], :]
+    A[:, :2] = np.linalg.solve(_masses(b, v), D)[:, [2, 4], :]
     A[:, 2, 1] = 1.0
     return A
 
 
-def _masses(model: Model, v: Mapping[str, Array]) -> Array:
+def _masses(body: Body, v: Mapping[str, Array]) -> Array:
     """M_RB - M_A (n, 6, 6) of the sampled derivatives."""
     size = len(next(iter(v.values())))
-    M = np.tile(model.mass_matrix, (size, 1, 1))
+    rigid = [[np.broadcast_to(a, (size,)) for a in row] for row in mass_matrix(body)]
+    M = np.array(_matrix(rigid))
     for i, load in enumerate(LOADS):
         for j, rate in enumerate(RATES):
             name = f"{load}{rate}dot"
             if name in v:
-                M[:, i, j] += model.derivatives[name] - v[name]
+                M[:, i, j] -= v[name]
     return M
 
 
-def index(model: Model, v: Mapping[str, Array], plane: str) -> Array:
+def index(model: Model, v: Mapping[str, Array], plane: str, body: Body | None = None) -> Array:
     """Stability index G (n,) of ``plane`` ("horizontal" or "vertical") for ``v`` = term -> (n,).
 
     Source     roddy1990; THEORY section 7. As ``model.linear.stability_indices``, for many sets at once.
     Valid      Ahead; the limit of high speed in the vertical plane. NaN where the linear terms do not damp.
     """
-    b, get = model.constants.body, _getter(v)
+    b, get = body or model.constants.body, _getter(v)
     if plane == "horizontal":
         above, below = get("Nuv") * (get("Yur") - b.m), get("Yuv") * (get("Nur") - b.xG * b.m)
     else:
@@ -176,6 +180,6 @@ def _getter(v: Mapping[str, Array]) -> Callable[[str], Array]:
     return lambda name: v.get(name, np.zeros(size))
 
 
-def _matrix(rows: list[list[Array]]) -> Array:
+def _matrix(rows: Sequence[Sequence[Array]]) -> Array:
     """(n, k, k) from a nested list of (n,)."""
     return np.moveaxis(np.array(rows), -1, 0)
