@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-
 import numpy as np
 
+from towtank.engine.flights import Flights
+from towtank.engine.plan import Gauge, Leg, Stat, Until
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.pilot.helm import Helm, sinking
 from towtank.pilot.law import Pilot
+from towtank.pilot.orders import Orders
 from towtank.quantity import Quantity
-from towtank.trials.integrate import Event, Flight, Leg, free_run
-from towtank.trials.outcome import trajectory
+from towtank.trials.ready import SPEED, Readings, Ready, last, run_trial
 from towtank.trials.start import Setting, angle, fin_limit, setting
 from towtank.trials.trajectory import Trajectory
 
 LONGEST = 240.0
 """Lengths travelled after which a turn that has not gone round is given up."""
-SHARES = (1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0)
-TURNS = (90.0, 180.0, 360.0, 540.0)
-"""Heading changes [deg] at which a leg ends; the last quarter turn gives the steady values."""
+TURNS = {90: 1.0 / 6.0, 180: 1.0 / 6.0, 360: 1.0 / 3.0, 450: 1.0 / 6.0, 540: 1.0 / 6.0}
+"""Heading change [deg] at which a leg ends -> its share of ``LONGEST``. The last quarter turn gives the steady values."""
+
+_DRIFT, _LEVEL_SPEED, _HEEL = Gauge("drift"), Gauge("level_speed"), Gauge("phi")
 
 
 def turning_circle(
@@ -44,6 +43,7 @@ def turning_circle(
 
     Indices: advance, transfer, tactical diameter, steady diameter [m] (and in lengths), time to 90, 180 and 360 deg
     [s], drift angle [deg], speed loss [%], yaw rate [deg/s]. Transfer and diameters count towards the side of the turn.
+    The steady values are means over the last quarter turn, or over the last 40 lengths where 540 deg are not reached.
 
     Source     ittc75040201: distances from the execute, at 90 and 180 deg of heading change.
 
@@ -52,98 +52,79 @@ def turning_circle(
     InputError
         Rudder zero, beyond the fins, or without a unit.
     """
+    return run_trial(model, circle_ready(model, rudder, speed, hold_depth, pilot))
+
+
+def circle_ready(
+    model: Model,
+    rudder: Quantity = "15 deg",
+    speed: Quantity | None = None,
+    hold_depth: bool = True,
+    pilot: Pilot | None = None,
+) -> Ready:
+    """The turning circle, ready to fly; arguments as in ``turning_circle``."""
     dr = angle(rudder, "rudder", fin_limit(model), "the limit of the fins")
     if dr == 0.0:
         raise InputError('rudder: 0 deg makes no turning circle. Give an angle such as "15 deg".')
     s = setting(model, speed, pilot, piloted=hold_depth)
-    helm = replace(s.helm, rudder=dr, depth=0.0) if hold_depth else replace(s.helm, rudder=dr, pilot=None)
-    flight = free_run(
-        model, s.state, _legs(helm, LONGEST * s.convective), thrust=s.thrust, interval=s.convective / 20.0
-    )
-    return trajectory(
-        model, s, flight, name=f"turning-{np.degrees(dr):g}deg", kind="turning circle", loop="open",
-        indices=_indices(model, s, flight), status=_status(flight),
+    length = model.craft.length
+    return Ready(
+        name=f"turning-{np.degrees(dr):g}deg", kind="turning circle", loop="open", setting=s,
+        legs=_legs(s.orders(rudder=dr, dive=float(hold_depth)), LONGEST * s.convective),
+        interval=s.convective / 20.0, gauges=(_DRIFT, _LEVEL_SPEED, _HEEL),
+        read=lambda flights: {**_distances(flights, length), **_steady(flights, s, length)}, status=_status,
     )  # fmt: skip
 
 
-def _legs(helm: Helm, longest: float) -> list[Leg]:
-    return [
-        Leg(f"to {turn:g} deg", helm, longest * share, turned(np.radians(turn)))
-        for turn, share in zip(TURNS, SHARES, strict=True)
-    ]
+def _legs(orders: Orders, longest: float) -> tuple[Leg, ...]:
+    """Legs to every heading change of either sign from a northerly start."""
+    return tuple(
+        Leg(f"to {turn} deg", orders, longest * share, Until("psi", float(np.radians(turn)), absolute=True))
+        for turn, share in TURNS.items()
+    )
 
 
-def turned(change: float) -> Event:
-    """Event at a heading change [rad] of either sign from a northerly start."""
-
-    def event(y: Sequence[float]) -> float:
-        return abs(y[5]) - change
-
-    return event
-
-
-def _status(flight: Flight) -> str | None:
-    missing = [mark.leg for mark in flight.marks if mark.ended == "time"]
-    if not missing:
+def _status(flights: Flights) -> str | None:
+    if flights.by_event[0].all():
         return None
-    reached = np.degrees(np.abs(flight.state[:, 5]).max())
+    reached = abs(np.degrees(last(flights, "psi")[0]))
     return (
         f"ended early: heading changed by {reached:.0f} deg in {LONGEST:g} lengths, 540 deg wanted. The rudder is too "
         "weak for a circle; give more rudder"
     )
 
 
-def _indices(model: Model, s: Setting, flight: Flight) -> dict[str, tuple[float, str]]:
-    length = model.craft.length
-    quarter, half, full = (flight.mark(f"to {turn:g} deg") for turn in TURNS[:3])
-    nan = float("nan")
-    side = float(np.sign(flight.state[-1, 5])) or 1.0
-    advance = float(quarter.state[0]) if quarter else nan
-    transfer = side * float(quarter.state[1]) if quarter else nan
-    tactical = side * float(half.state[1]) if half else nan
-    out = {
+def _distances(flights: Flights, length: float) -> Readings:
+    side = np.where(last(flights, "psi") < 0.0, -1.0, 1.0)
+    advance, transfer = flights.at("to 90 deg", "x"), side * flights.at("to 90 deg", "y")
+    tactical = side * flights.at("to 180 deg", "y")
+    return {
         "advance": (advance, "m"),
         "transfer": (transfer, "m"),
         "tactical_diameter": (tactical, "m"),
         "advance_lengths": (advance / length, ""),
         "tactical_diameter_lengths": (tactical / length, ""),
-        "time_to_90": (quarter.time if quarter else nan, "s"),
-        "time_to_180": (half.time if half else nan, "s"),
-        "time_to_360": (full.time if full else nan, "s"),
+        "time_to_90": (flights.when("to 90 deg"), "s"),
+        "time_to_180": (flights.when("to 180 deg"), "s"),
+        "time_to_360": (flights.when("to 360 deg"), "s"),
     }
-    return {**out, **_steady(s, flight, length)}
 
 
-def _steady(s: Setting, flight: Flight, length: float) -> dict[str, tuple[float, str]]:
-    """Means over the last quarter turn."""
-    state = flight.state
-    last = np.abs(state[:, 5]) > np.abs(state[-1, 5]) - np.pi / 2.0
-    if np.abs(state[-1, 5]) < np.pi or last.sum() < 4:
-        last = np.zeros(len(state), bool)
-        last[-4:] = True
-    time, turning = flight.time[last], state[last]
-    rate = float((turning[-1, 5] - turning[0, 5]) / (time[-1] - time[0]))
-    mean = _mean(time)
-    speed = mean(np.linalg.norm(turning[:, 6:9], axis=1))
-    drift = mean(np.arctan2(-turning[:, 7], turning[:, 6]))
-    level = mean(np.linalg.norm(turning[:, 6:9], axis=1) * np.cos(_climb(turning)))
-    diameter = 2.0 * level / abs(rate) if rate != 0.0 else float("nan")
+def _steady(flights: Flights, s: Setting, length: float) -> Readings:
+    """Means over the last leg; NaN where it was not flown to its end."""
+    leg, before = "to 540 deg", "to 450 deg"
+    lasting = flights.duration(leg)
+
+    def mean(gauge: Gauge) -> Array:
+        return flights.stat(leg, gauge, Stat.INTEGRAL) / lasting
+
+    rate = (flights.at(leg, "psi", event=False) - flights.at(before, "psi", event=False)) / lasting
+    diameter = 2.0 * mean(_LEVEL_SPEED) / np.where(rate == 0.0, np.nan, np.abs(rate))
     return {
         "steady_diameter": (diameter, "m"),
         "steady_diameter_lengths": (diameter / length, ""),
-        "yaw_rate": (float(np.degrees(rate)), "deg/s"),
-        "drift_angle": (float(np.degrees(drift)), "deg"),
-        "speed_loss": (100.0 * (1.0 - speed / s.speed), "%"),
-        "roll_in_turn": (float(np.degrees(mean(turning[:, 3]))), "deg"),
+        "yaw_rate": (np.degrees(rate), "deg/s"),
+        "drift_angle": (np.degrees(mean(_DRIFT)), "deg"),
+        "speed_loss": (100.0 * (1.0 - mean(SPEED) / s.speed), "%"),
+        "roll_in_turn": (np.degrees(mean(_HEEL)), "deg"),
     }
-
-
-def _mean(time: Array) -> Callable[[Array], float]:
-    return lambda values: float(np.trapezoid(values, time) / (time[-1] - time[0]))
-
-
-def _climb(state: Array) -> Array:
-    """Angle of the path below the horizontal [rad]."""
-    speed = np.linalg.norm(state[:, 6:9], axis=1)
-    down = np.array([sinking(row) for row in state.tolist()])
-    return np.asarray(np.arcsin(np.clip(down / speed, -1.0, 1.0)))
