@@ -19,7 +19,7 @@ from towtank.trials.trajectory import Trajectory
 LONGEST = 240.0
 """Lengths travelled after which a turn that has not gone round is given up."""
 TURNS = {90: 1.0 / 6.0, 180: 1.0 / 6.0, 360: 1.0 / 3.0, 450: 1.0 / 6.0, 540: 1.0 / 6.0}
-"""Heading change [deg] at which a leg ends -> its share of ``LONGEST``. The last quarter turn gives the steady values."""
+"""Heading change [deg] that ends a leg -> its share of ``LONGEST``. The last quarter turn gives the steady values."""
 
 _DRIFT, _LEVEL_SPEED, _HEEL = Gauge("drift"), Gauge("level_speed"), Gauge("phi")
 

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
+from towtank.engine.flights import Flights
+from towtank.engine.plan import Leg
 from towtank.errors import InputError
+from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
-from towtank.trials.integrate import Flight, Leg, free_run
-from towtank.trials.outcome import trajectory
+from towtank.trials.ready import Readings, Ready, run_trial
 from towtank.trials.start import angle, fin_limit, setting
 from towtank.trials.trajectory import Trajectory
 
 TURNING, SETTLING = 12.0, 20.0
 """Lengths travelled in the turn, and after the rudder is put amidships."""
+LEFT = 0.1
+"""Share of the settling over which the residual rate is the mean."""
 
 
 def pull_out(
@@ -45,41 +46,68 @@ def pull_out(
     InputError
         Rudder zero, beyond the fins, or without a unit.
     """
+    return run_trial(model, pull_out_ready(model, rudder, speed, hold_depth, pilot))
+
+
+def pull_out_ready(
+    model: Model,
+    rudder: Quantity = "15 deg",
+    speed: Quantity | None = None,
+    hold_depth: bool = True,
+    pilot: Pilot | None = None,
+) -> Ready:
+    """The pull-out, ready to fly; arguments as in ``pull_out``. Its readings need the channel ``turn`` on record."""
     dr = angle(rudder, "rudder", fin_limit(model), "the limit of the fins")
     if dr == 0.0:
         raise InputError('rudder: 0 deg makes no turn to pull out of. Give an angle such as "15 deg".')
     s = setting(model, speed, pilot, piloted=hold_depth)
-    base = replace(s.helm, depth=0.0) if hold_depth else replace(s.helm, pilot=None)
-    orders: Sequence[tuple[str, float, float]] = (
+    plan = (
         ("turn plus", dr, TURNING),
-        ("out plus", 0.0, SETTLING),
+        ("out plus", 0.0, (1.0 - LEFT) * SETTLING),
+        ("left plus", 0.0, LEFT * SETTLING),
         ("turn minus", -dr, TURNING + 3.0),
-        ("out minus", 0.0, SETTLING),
+        ("out minus", 0.0, (1.0 - LEFT) * SETTLING),
+        ("left minus", 0.0, LEFT * SETTLING),
     )
-    legs = [Leg(name, replace(base, rudder=order), lengths * s.convective) for name, order, lengths in orders]
-    flight = free_run(model, s.state, legs, thrust=s.thrust, interval=s.convective / 16.0)
-    indices = {**_side(flight, "plus", s.convective), **_side(flight, "minus", s.convective)}
-    return trajectory(
-        model, s, flight, name=f"pull-out-{abs(np.degrees(dr)):g}deg", kind="pull-out", loop="open", indices=indices
+    legs = tuple(
+        Leg(name, s.orders(rudder=order, dive=float(hold_depth)), lengths * s.convective)
+        for name, order, lengths in plan
     )
+    return Ready(
+        name=f"pull-out-{abs(np.degrees(dr)):g}deg", kind="pull-out", loop="open", setting=s, legs=legs,
+        interval=s.convective / 16.0, read=lambda flights: {**_side(flights, "plus"), **_side(flights, "minus")},
+    )  # fmt: skip
 
 
-def _side(flight: Flight, word: str, convective: float) -> dict[str, tuple[float, str]]:
-    inside = flight.within(f"out {word}")
-    if inside.sum() < 8:
-        nan = float("nan")
-        return {
-            f"turning_rate_{word}": (nan, "deg/s"),
-            f"residual_rate_{word}": (nan, "deg/s"),
-            f"decay_{word}": (nan, "s"),
-        }
-    time, heading = flight.time[inside], flight.state[inside, 5]
-    rate = np.gradient(heading, time)
-    residual = float(np.mean(rate[-max(len(rate) // 10, 2) : -1]))
-    excess = np.abs(rate - residual) - np.abs(rate[0] - residual) / np.e
-    below = np.flatnonzero(excess < 0.0)
+def _side(flights: Flights, word: str) -> Readings:
+    turn, out, left = (f"{part} {word}" for part in ("turn", "out", "left"))
+    rate = flights.at(turn, "turn", event=False)
+    residual = _heading_change(flights, out, left) / flights.duration(left)
+    begin, end = flights.when(turn, event=False), flights.when(left, event=False)
+    decay = [_decay(flights, i, *numbers) for i, numbers in enumerate(zip(begin, end, rate, residual, strict=True))]
     return {
-        f"turning_rate_{word}": (float(np.degrees(rate[0])), "deg/s"),
-        f"residual_rate_{word}": (float(np.degrees(residual)), "deg/s"),
-        f"decay_{word}": (float(time[below[0]] - time[0]) if len(below) else float("nan"), "s"),
+        f"turning_rate_{word}": (np.degrees(rate), "deg/s"),
+        f"residual_rate_{word}": (np.degrees(residual), "deg/s"),
+        f"decay_{word}": (np.array(decay), "s"),
     }
+
+
+def _heading_change(flights: Flights, before: str, leg: str) -> Array:
+    """Heading change (N,) [rad] in ``leg``, which follows ``before``."""
+    return flights.at(leg, "psi", event=False) - flights.at(before, "psi", event=False)
+
+
+def _decay(flights: Flights, i: int, begin: float, end: float, rate: float, residual: float) -> float:
+    """Time [s] in which the excess over the ``residual`` falls to 1/e; NaN if it does not.
+
+    Between the samples the rate is taken as a straight line.
+    """
+    inside = (flights.time > begin) & (flights.time <= end)
+    time = np.concatenate([[begin], flights.time[inside]])
+    rates = np.concatenate([[rate], flights.series("turn")[i, inside]])
+    excess = np.abs(rates - residual) - abs(rate - residual) / np.e
+    below = np.flatnonzero(excess < 0.0)
+    if not len(below):
+        return float("nan")
+    after = int(below[0])
+    return float(np.interp(0.0, excess[[after, after - 1]], time[[after, after - 1]]) - begin)

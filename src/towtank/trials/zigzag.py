@@ -2,39 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from towtank.engine.flights import Flights
+from towtank.engine.plan import Gauge, Leg, Stat, Until
 from towtank.errors import InputError
+from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.pilot.helm import Helm
 from towtank.pilot.law import Pilot
+from towtank.pilot.orders import Orders
 from towtank.quantity import Quantity
 from towtank.trials import start
-from towtank.trials.integrate import Event, Flight, Leg, free_run
-from towtank.trials.outcome import crossing, peak, trajectory
+from towtank.trials.ready import Readings, Ready, last, run_trial
 from towtank.trials.trajectory import Trajectory
 
 LONGEST = 25.0
-"""Lengths travelled after which a leg whose execute angle is not reached ends the trial."""
+"""Lengths travelled after which a leg whose angle is not reached ends the trial."""
 EXECUTES = 4
 
 
 @dataclass(frozen=True)
 class _Plane:
-    """What swings: column of its angle in the state, the control that swings it, the derivative, the word for it."""
+    """What swings: gauges of its angle and rate, the control that swings it, the derivative, the word for it."""
 
-    column: int
+    angle: Gauge
+    rate: Gauge
     control: str
     effect: str
     word: str
 
 
 _PLANES = {
-    "horizontal": _Plane(5, "rudder", "Nuudr", "heading"),
-    "vertical": _Plane(4, "elevator", "Muude", "pitch"),
+    "horizontal": _Plane(Gauge("psi"), Gauge("turn"), "rudder", "Nuudr", "heading"),
+    "vertical": _Plane(Gauge("theta"), Gauge("q"), "elevator", "Muude", "pitch"),
 }
 
 
@@ -71,7 +73,8 @@ def zigzag(
         vertical plane the heading is held by the pilot instead.
 
     Indices: first and second overshoot [deg], initial turning time (execute to the execute angle), time to check the
-    first swing, reach, period [s]. NaN where the craft did not get that far; the status then says why.
+    first and the second swing (execute to rate zero), reach, period [s]. NaN where the craft did not get that far; the
+    status then says why.
 
     Source     ittc75040201, zigzag test.
 
@@ -80,95 +83,96 @@ def zigzag(
     InputError
         Another plane; an angle of zero, beyond the fins, or without a unit.
     """
+    return run_trial(model, zigzag_ready(model, angle, heading, speed, plane, hold_depth, pilot))
+
+
+def zigzag_ready(
+    model: Model,
+    angle: Quantity = "10 deg",
+    heading: Quantity = "10 deg",
+    speed: Quantity | None = None,
+    plane: str = "horizontal",
+    hold_depth: bool = True,
+    pilot: Pilot | None = None,
+) -> Ready:
+    """The zigzag, ready to fly; arguments as in ``zigzag``."""
     if plane not in _PLANES:
         raise InputError(f'plane {plane!r}: a zigzag is "horizontal" (rudder) or "vertical" (elevator).')
-    swings = _PLANES[plane]
+    swings, vertical = _PLANES[plane], plane == "vertical"
     control = start.angle(angle, "angle", start.fin_limit(model), "the limit of the fins")
     execute = start.angle(heading, "heading", np.radians(60.0), "beyond which a zigzag is a turning circle")
     if control == 0.0 or execute <= 0.0:
         raise InputError(f"zigzag {angle}/{heading}: both angles must differ from zero, the execute angle positive.")
     s = start.setting(model, speed, pilot, piloted=hold_depth)
-    vertical = plane == "vertical"
-    effect = model.derivatives[swings.effect] or -1.0
-    swing = _Swing(
-        swings,
-        control,
-        execute,
-        s.trim.elevator if vertical else 0.0,
-        s.trim.pitch if vertical else 0.0,
-        float(np.sign(effect * control)),
-    )
-    if vertical:
-        base = replace(s.helm, heading=0.0 if hold_depth else None)
-    else:
-        base = replace(s.helm, depth=0.0 if hold_depth else None)
-    base = base if hold_depth else replace(base, pilot=None)
-    flight = free_run(
-        model, s.state, _legs(swing, base, LONGEST * s.convective), thrust=s.thrust, interval=s.convective / 20.0
-    )
-    name = f"zigzag-{abs(np.degrees(control)):g}-{np.degrees(execute):g}" + ("-vertical" if vertical else "")
-    return trajectory(
-        model, s, flight, name=name, kind=f"zigzag, {plane}", loop="open",
-        indices=_indices(swing, flight), status=_status(swing, flight),
+    side = float(np.sign((model.derivatives[swings.effect] or -1.0) * control))
+    neutral, trimmed = (s.trim.elevator, s.trim.pitch) if vertical else (0.0, 0.0)
+    swing = _Swing(swings, control, execute, neutral, trimmed, side)
+    held = s.orders(**{"steer" if vertical else "dive": float(hold_depth)})
+    return Ready(
+        name=f"zigzag-{abs(np.degrees(control)):g}-{np.degrees(execute):g}" + ("-vertical" if vertical else ""),
+        kind=f"zigzag, {plane}", loop="open", setting=s, legs=_legs(swing, held, LONGEST * s.convective),
+        interval=s.convective / 20.0, gauges=(swings.angle, swings.rate),
+        read=lambda flights: _indices(swing, flights), status=lambda flights: _status(swing, flights),
     )  # fmt: skip
 
 
-def _legs(swing: _Swing, base: Helm, within: float) -> list[Leg]:
-    """One leg per execute; the last ends when the angle is back at its start."""
-    legs = []
-    for i in range(EXECUTES + 1):
+def _legs(swing: _Swing, held: Orders, within: float) -> tuple[Leg, ...]:
+    """A leg to the first execute; then after every execute one back to the start and one on to the other side."""
+    legs: list[Leg] = []
+
+    def leg(name: str, control: float, goal: float) -> None:
+        orders = replace(held, **{swing.plane.control: swing.neutral + control})
+        until = Until(swing.plane.angle.channel, swing.trimmed + goal)
+        legs.append(Leg(name, orders, within, until, required=True))
+
+    for i in range(EXECUTES):
         sign = -1.0 if i % 2 else 1.0
-        order = swing.neutral + sign * swing.control
-        helm = replace(base, rudder=order) if swing.plane.control == "rudder" else replace(base, elevator=order)
-        goal = swing.trimmed + (0.0 if i == EXECUTES else sign * swing.side * swing.execute)
-        legs.append(Leg(f"swing {i + 1}", helm, within, passing(swing.plane.column, goal), required=True))
-    return legs
+        if i:
+            leg(f"back {i + 1}", sign * swing.control, 0.0)
+        leg(f"swing {i + 1}", sign * swing.control, sign * swing.side * swing.execute)
+    leg(f"swing {EXECUTES + 1}", -sign * swing.control, 0.0)
+    return tuple(legs)
 
 
-def passing(column: int, level: float) -> Event:
-    """Event when a state passes ``level``."""
-
-    def event(y: Sequence[float]) -> float:
-        return y[column] - level
-
-    return event
-
-
-def _status(swing: _Swing, flight: Flight) -> str | None:
-    late = next((i for i in range(EXECUTES + 1) if flight.mark(f"swing {i + 1}") is None), None)
-    if late is None:
+def _status(swing: _Swing, flights: Flights) -> str | None:
+    if flights.by_event[0].all():
         return None
-    inside = flight.within(f"swing {late + 1}")
-    values = np.degrees(flight.state[inside, swing.plane.column] - swing.trimmed)
-    far = values[np.argmax(np.abs(values))] if len(values) else 0.0
+    late = flights.legs[int(np.argmin(flights.by_event[0]))].name
     word, wanted = swing.plane.word, np.degrees(swing.execute)
-    if late == 0:
+    if late == "swing 1":
+        gauge = swing.plane.angle
+        ends = [np.degrees(flights.over(gauge, stat)[0] - swing.trimmed) for stat in (Stat.LOW, Stat.HIGH)]
         return (
-            f"ended early: did not respond. {word} changed by {far:.2g} deg of the {wanted:g} deg wanted in "
-            f"{LONGEST:g} lengths; the {swing.plane.control} is too weak against the craft's own moments"
+            f"ended early: did not respond. {word} changed by {max(ends, key=abs):.2g} deg of the {wanted:g} deg "
+            f"wanted in {LONGEST:g} lengths; the {swing.plane.control} is too weak against the craft's own moments"
         )
+    stood = np.degrees(last(flights, swing.plane.angle.channel)[0] - swing.trimmed)
     return (
-        f"ended early: after execute {late + 1} the {word} stood at {values[-1]:.3g} deg and did not come back in "
+        f"ended early: after execute {late.split()[1]} the {word} stood at {stood:.3g} deg and did not come back in "
         f"{LONGEST:g} lengths; the craft does not answer this {swing.plane.control} angle"
     )
 
 
-def _indices(swing: _Swing, flight: Flight) -> dict[str, tuple[float, str]]:
+def _indices(swing: _Swing, flights: Flights) -> Readings:
     """Times [s] from the first execute, overshoots [deg]."""
-    marks = [flight.mark(f"swing {i + 1}") for i in range(EXECUTES + 1)]
-    angle = np.degrees(flight.state[:, swing.plane.column] - swing.trimmed) * swing.side
-    wanted = float(np.degrees(swing.execute))
-    nan = float("nan")
-    out: dict[str, tuple[float, str]] = {"initial_turning_time": (marks[0].time if marks[0] else nan, "s")}
-    for i, word in ((0, "first"), (1, "second")):
-        begin, end = marks[i], marks[i + 1]
-        height, time = nan, nan
-        if begin is not None and end is not None:
-            inside = flight.within(f"swing {i + 2}")
-            time, height = peak(flight.time[inside], (-angle if i else angle)[inside])
-        out[f"{word}_overshoot"] = (max(height - wanted, 0.0) if height == height else nan, "deg")
-        out[f"time_to_check_{word}"] = (time - begin.time if begin and time == time else nan, "s")
-    back = flight.within("swing 2")
-    out["reach"] = (crossing(flight.time[back], angle[back], 0.0) if marks[1] else nan, "s")
-    out["period"] = (marks[3].time - marks[1].time if marks[1] and marks[3] else nan, "s")
-    return out
+    return {
+        "initial_turning_time": (flights.when("swing 1"), "s"),
+        **_check(swing, flights, 1, "first"),
+        **_check(swing, flights, 2, "second"),
+        "reach": (flights.when("back 2"), "s"),
+        "period": (flights.when("swing 4") - flights.when("swing 2"), "s"),
+    }
+
+
+def _check(swing: _Swing, flights: Flights, execute: int, word: str) -> Readings:
+    """How far and how long the craft swings on after an execute, before it comes back to its start."""
+    leg, side = f"back {execute + 1}", swing.side if execute % 2 else -swing.side
+    far, when = (Stat.HIGH, Stat.HIGH_TIME) if side > 0.0 else (Stat.LOW, Stat.LOW_TIME)
+    height = side * (flights.stat(leg, swing.plane.angle, far) - swing.trimmed) - swing.execute
+    stop = flights.stat(leg, swing.plane.rate, Stat.FIRST)
+    checked: Array = np.where(np.isnan(stop), flights.stat(leg, swing.plane.angle, when), stop)
+    came_back = ~np.isnan(flights.when(leg))
+    return {
+        f"{word}_overshoot": (np.where(came_back, np.degrees(np.maximum(height, 0.0)), np.nan), "deg"),
+        f"time_to_check_{word}": (np.where(came_back, checked - flights.when(f"swing {execute}"), np.nan), "s"),
+    }
