@@ -123,7 +123,7 @@ def _contours(ax: Axes, table: SweepTable, column: str, values: Array) -> None:
     X, Y = np.meshgrid(x[i], y[j], indexing="ij")
     Z = np.ma.masked_invalid(values[np.ix_(i, j)])
     if Z.count() and float(np.ptp(Z.compressed())) > 0.0:
-        filled = ax.contourf(X, Y, Z, levels=12, cmap="Blues", alpha=0.75)
+        filled = ax.contourf(X, Y, Z, levels=12, cmap="Blues", alpha=0.5)
         lines = ax.contour(X, Y, Z, levels=filled.levels, colors=FIT, linewidths=0.5, linestyles="solid")
         ax.clabel(lines, fontsize=6, fmt="%.3g")
         if column in ZERO_MATTERS and Z.min() < 0.0 < Z.max():
@@ -136,4 +136,5 @@ def _contours(ax: Axes, table: SweepTable, column: str, values: Array) -> None:
         if x.min() <= base[0] <= x.max() and y.min() <= base[1] <= y.max():
             ax.plot(*base, "s", markerfacecolor="none", markeredgecolor=INK, markersize=7)
     frame(ax, table.axes[0].label, table.axes[1].label, zero=False)
+    ax.use_sticky_edges = False  # the points on the rim are to be seen whole
     ax.margins(0.03)

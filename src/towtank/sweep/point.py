@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
-from towtank.craft.craft import Craft
+from towtank.craft.craft import Craft, Mass
 from towtank.derive.derive import derive
 from towtank.derive.show import origin_primes, primes
+from towtank.derive.table import Derivatives
 from towtank.errors import TrialError
 from towtank.model.equations import Model
 from towtank.plan.standard import standard_plan
@@ -28,6 +30,9 @@ from towtank.verdict.table import Verdict
 SLOPES = ("Yuv", "Nuv", "Yur", "Nur", "Zuw", "Muw", "Zuq", "Muq")
 DERIVATIVES = (*SLOPES, "Yvdot", "Nrdot", "Zwdot", "Mqdot", "Yuudr", "Nuudr", "Zuude", "Muude", "Xuu", "Kup")
 """Derivatives that a point lists, primed; the slopes at the origin as well, under ``<name>'.origin``."""
+
+_WEIGHTLESS = Mass(1.0, 1.0, (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+"""Stands for the mass of a craft in the tank, which measures hydrodynamic loads only."""
 
 Numbers = dict[str, tuple[float, str]]
 """Name -> (value, unit)."""
@@ -61,7 +66,7 @@ def evaluate(craft: Craft, tank: FastTank | None = None, trials: Sequence[str] =
     TowtankError
         A stage before the trials failed.
     """
-    model = Model(craft, derive(tow(standard_plan(craft), tank or FastTank())))
+    model = Model(craft, _derived(replace(craft, mass=_WEIGHTLESS), tank or FastTank()))
     made: dict[str, Trajectory] = {}
     notes: list[str] = []
     if trials and craft.fins:
@@ -76,6 +81,12 @@ def evaluate(craft: Craft, tank: FastTank | None = None, trials: Sequence[str] =
                 made[name] = trial
                 notes += [note for note in trial.provenance.get("notes", []) if note.startswith("Not trimmed")]
     return Evaluated(model, made, assess(model, tuple(made.values())), tuple(dict.fromkeys(notes)))
+
+
+@lru_cache(maxsize=8)
+def _derived(craft: Craft, tank: FastTank) -> Derivatives:
+    """Derivatives of a craft. The water does not feel where the weight is: variants of mass and CG share them."""
+    return derive(tow(standard_plan(craft), tank))
 
 
 def _carried_out(model: Model, name: str) -> tuple[Trajectory | None, list[str]]:
