@@ -31,8 +31,9 @@ def file_hash(path: Path) -> str:
 def program_hash() -> str:
     """Version and hash of the package's source, so that results of another program are not taken for present ones."""
     source = hashlib.sha256()
-    for path in sorted(Path(__file__).resolve().parents[1].rglob("*.py")):
-        source.update(path.read_bytes())
+    for path in sorted(Path(__file__).resolve().parents[1].rglob("*")):
+        if path.suffix in (".py", ".c", ".h"):
+            source.update(path.read_bytes())
     return f"{VERSION}+{source.hexdigest()[:8]}"
 
 
