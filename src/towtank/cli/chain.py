@@ -261,7 +261,7 @@ class Chain:
     def _trials(self) -> Sequence[Path]:
         from towtank.trials.standard import standard_trials
 
-        return self._write_trials(standard_trials(self.model(), self.reply.progress, cores()))
+        return self._write_trials(standard_trials(self.model(), self.reply.progress))
 
     def add_trial(self, trajectory: Trajectory) -> None:
         """Write one more trial beside those of the study."""

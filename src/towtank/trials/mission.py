@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from towtank.engine.flights import Flights
+from towtank.engine.plan import Ended, Gauge, Leg, Stat, Until
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import STILL, Model
-from towtank.pilot.helm import LineOfSight
+from towtank.pilot.guidance import Point, line
 from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity, si
-from towtank.trials.integrate import Event, Flight, Leg, free_run
-from towtank.trials.outcome import trajectory
+from towtank.trials.ready import SPEED, Readings, Ready, run_trial
 from towtank.trials.start import Setting, fin_limit, setting
 from towtank.trials.steady import turning_diameter
 from towtank.trials.steps import adrift, drifting
@@ -32,7 +33,11 @@ WIDEST = 12.0
 RUDDER_SHARE = 0.6
 """Share of the rudder range that the turns between legs are planned with."""
 PATIENCE = 3.0
-"""A leg is given up after this multiple of the time it should take."""
+"""A leg, or a half of a long one, is given up after this multiple of the time it should take."""
+SETTLED = 0.5
+"""Share of a long leg after which the craft should have come onto it."""
+
+_ACROSS, _DEEP = Gauge("across", absolute=True), Gauge("z")
 
 
 def lawnmower(
@@ -64,6 +69,20 @@ def lawnmower(
     InputError
         No legs, a leg shorter than 8 craft lengths, a spacing below 4: the turns would take up the legs.
     """
+    return run_trial(model, lawnmower_ready(model, legs, leg_length, spacing, depth, speed, pilot, current))
+
+
+def lawnmower_ready(
+    model: Model,
+    legs: int = 4,
+    leg_length: Quantity | None = None,
+    spacing: Quantity | None = None,
+    depth: Quantity = 0.0,
+    speed: Quantity | None = None,
+    pilot: Pilot | None = None,
+    current: Sequence[float] = STILL,
+) -> Ready:
+    """The lawnmower, ready to fly; arguments as in ``lawnmower``."""
     length = model.craft.length
     s = setting(model, speed, pilot)
     diameter = min(turning_diameter(model, s.speed, RUDDER_SHARE * fin_limit(model)), WIDEST * length)
@@ -75,89 +94,108 @@ def lawnmower(
             f"{8.0 * length:.3g} m and a spacing of {4.0 * length:.3g} m (8 and 4 craft lengths), or the turns take up "
             "the legs. Give longer legs or a wider spacing."
         )
-    below = si(depth, "m", "depth")
-    start = s.state.copy()
-    start[6:9] += adrift(s, current)
-    lines = _lines(legs, long_, short, _lookahead(s, length))
-    early = max(2.0 * length, 0.5 * diameter)
-    track = [_leg(s, f"leg {i + 1}", line, below, early, current) for i, line in enumerate(lines)]
-    flight = free_run(model, start, track, thrust=s.thrust, interval=s.convective / 8.0, current=tuple(current))
-    lost = next((m.leg for m in flight.marks if m.ended == "time"), None)
-    status = lost and (
-        f"ended early: {lost} was not completed in {PATIENCE:g} times the time it should take; the craft does not hold "
-        "the track"
-    )
-    return trajectory(
-        model, s, flight, name="lawnmower", kind="lawnmower", loop="closed",
-        indices=_indices(flight, lines, below), status=status, current=current,
-        curves={"track": {"north": [p[0] for p in _corners(lines)], "east": [p[1] for p in _corners(lines)]}},
+    below, start = si(depth, "m", "depth"), adrift(s, current)
+    corners, early = _corners(legs, long_, short), max(2.0 * length, 0.5 * diameter)
+    pieces = _pieces(s, corners, below, early, _lookahead(s, length), drifting(current))
+    return Ready(
+        name="lawnmower", kind="lawnmower", loop="closed", setting=s, legs=tuple(piece.leg for piece in pieces),
+        interval=s.convective / 8.0, gauges=(_ACROSS, _DEEP), start=start, current=drifting(current),
+        read=lambda flights: _indices(flights, pieces, below), status=lambda flights: _status(flights, pieces),
+        curves=lambda _: {"track": {"north": [p[0] for p in corners], "east": [p[1] for p in corners]}},
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """A leg of the run: ``line`` [-] counts the lines of the pattern from one; the long ones are odd.
+
+    settled : on a long line, and beyond the part in which the craft comes onto it.
+    """
+
+    leg: Leg
+    line: int
+    settled: bool
+
+    @property
+    def long(self) -> bool:
+        """On a long line."""
+        return self.line % 2 == 1
+
+
 def _lookahead(s: Setting, length: float) -> float:
-    gain = s.helm.pilot.heading if s.helm.pilot else 0.0
+    gain = s.pilot.heading if s.pilot else 0.0
     return max(3.0 * length, LOOKAHEAD * s.speed / gain) if gain > 0.0 else 3.0 * length
 
 
-def _lines(legs: int, long_: float, short: float, lookahead: float) -> list[LineOfSight]:
-    """Long and short legs in order."""
+def _corners(legs: int, long_: float, short: float) -> list[Point]:
+    """Ends of the long and short lines in order."""
     corners = [(0.0, 0.0)]
     for i in range(legs):
         north, east = corners[-1]
         corners.append((north + (long_ if i % 2 == 0 else -long_), east))
         if i < legs - 1:
             corners.append((corners[-1][0], east + short))
-    gain = 1.0 / (DRIFT * lookahead)
-    return [
-        LineOfSight(a, b, lookahead, gain) for a, b in pairwise(corners)
-    ]  # fmt: skip
+    return corners
 
 
-def _corners(lines: list[LineOfSight]) -> list[tuple[float, float]]:
-    return [lines[0].start, *(line.end for line in lines)]
+def _pieces(
+    s: Setting,
+    corners: Sequence[Point],
+    depth: float,
+    early: float,
+    lookahead: float,
+    current: tuple[float, float, float],
+) -> tuple[_Piece, ...]:
+    """The lines as legs. One ends ``early`` [m] before its corner, so that the turn ends on the next line."""
+    pieces = []
+    for i, (a, b) in enumerate(pairwise(corners), start=1):
+        length, course = math.dist(a, b), math.atan2(b[1] - a[1], b[0] - a[0])
+        crab = math.asin((current[1] * math.cos(course) - current[0] * math.sin(course)) / s.speed)
+        entries = line(a, b, lookahead, s.speed / (DRIFT * lookahead), crab)
+        orders = s.orders(dive=1.0, depth=depth, **entries)
+        expected = length / max(s.speed - math.hypot(current[0], current[1]), 0.2 * s.speed)
+        level, half = length - early, SETTLED * length
+        split = i % 2 == 1 and level > half
+        if split:
+            onto = Leg(f"leg {i} coming on", orders, SETTLED * PATIENCE * expected, Until("along", half), required=True)
+            pieces.append(_Piece(onto, i, False))
+        within = (1.0 - SETTLED if split else 1.0) * PATIENCE * expected
+        pieces.append(_Piece(Leg(f"leg {i}", orders, within, Until("along", level), required=True), i, split))
+    return tuple(pieces)
 
 
-def _leg(s: Setting, name: str, line: LineOfSight, depth: float, early: float, current: Sequence[float]) -> Leg:
-    """One straight leg; it ends ``early`` [m] before its corner, so that the turn ends on the next one."""
-    against = math.hypot(current[0], current[1])
-    expected = line.length / max(s.speed - against, 0.2 * s.speed)
-    across = current[1] * math.cos(line.course) - current[0] * math.sin(line.course)
-    scaled = replace(line, gain=line.gain * s.speed, crab=math.asin(across / s.speed))
-    helm = replace(s.helm, guidance=scaled, depth=depth, current=drifting(current))
-    return Leg(name, helm, PATIENCE * expected, _passed(line, early), required=True)
+def _status(flights: Flights, pieces: Sequence[_Piece]) -> str | None:
+    if flights.ended[0] != Ended.LATE:
+        return None
+    lost = pieces[int(np.count_nonzero(~np.isnan(flights.mark_time[0]))) - 1].line
+    return (
+        f"ended early: leg {lost} was not completed in {PATIENCE:g} times the time it should take; the craft does not "
+        "hold the track"
+    )
 
 
-def _passed(line: LineOfSight, early: float) -> Event:
-    def event(y: Sequence[float]) -> float:
-        return line.along_and_across(y[0], y[1])[0] - (line.length - early)
+def _indices(flights: Flights, pieces: Sequence[_Piece], depth: float) -> Readings:
+    """Sums over the legs that were ended, in time or not; NaN where there was none."""
+    lasting = np.diff(flights.mark_time, axis=1, prepend=0.0)
+    settled = np.array([piece.settled for piece in pieces])
+    long_ = np.array([piece.long for piece in pieces])
 
-    return event
+    def over(gauge: Gauge, stat: Stat) -> Array:
+        return flights.stats[:, :, flights.gauges.index(gauge), stat]
 
-
-def _indices(flight: Flight, lines: list[LineOfSight], depth: float) -> dict[str, tuple[float, str]]:
-    whole: list[Array] = []
-    settled: list[Array] = []
-    deep: list[Array] = []
-    for i, line in enumerate(lines):
-        inside = flight.leg == i
-        if i % 2 or not inside.any():
-            continue
-        places = flight.state[inside]
-        both = np.array([line.along_and_across(n, e) for n, e in places[:, :2]])
-        on = both[:, 0] > 0.5 * line.length
-        whole.append(both[:, 1])
-        settled.append(both[on, 1])
-        deep.append(places[on, 2] - depth)
-    path = float(np.linalg.norm(np.diff(flight.state[:, :3], axis=0), axis=1).sum())
+    deep = over(_DEEP, Stat.SQUARE) - 2.0 * depth * over(_DEEP, Stat.INTEGRAL) + depth * depth * lasting
     return {
-        "off_track_rms": (_rms(settled), "m"),
-        "off_track_largest": (max((float(np.abs(x).max()) for x in settled if len(x)), default=float("nan")), "m"),
-        "off_track_rms_whole": (_rms(whole), "m"),
-        "depth_error_rms": (_rms(deep), "m"),
-        "distance": (path, "m"),
+        "off_track_rms": (_rms(over(_ACROSS, Stat.SQUARE), lasting, settled), "m"),
+        "off_track_largest": (np.fmax.reduce(over(_ACROSS, Stat.HIGH)[:, settled], axis=1, initial=np.nan), "m"),
+        "off_track_rms_whole": (_rms(over(_ACROSS, Stat.SQUARE), lasting, long_), "m"),
+        "depth_error_rms": (_rms(deep, lasting, long_), "m"),
+        "distance": (flights.over(SPEED, Stat.INTEGRAL), "m"),
     }
 
 
-def _rms(pieces: list[Array]) -> float:
-    values = np.concatenate(pieces) if pieces else np.zeros(0)
-    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+def _rms(squares: Array, lasting: Array, legs: Array) -> Array:
+    """Root of the mean over time of what has the integrals ``squares`` (N, L), over ``legs`` (L,)."""
+    time = np.nansum(lasting[:, legs], axis=1)
+    with np.errstate(all="ignore"):
+        mean = np.nansum(squares[:, legs], axis=1) / time
+    return np.sqrt(np.maximum(np.where(time > 0.0, mean, np.nan), 0.0))

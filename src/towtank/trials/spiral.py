@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from towtank.engine.flights import Flights
+from towtank.engine.plan import Leg
 from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.pilot.helm import Helm
 from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
-from towtank.trials.integrate import Flight, Leg, free_run
-from towtank.trials.outcome import trajectory
-from towtank.trials.start import angle, fin_limit, setting
+from towtank.trials.ready import Readings, Ready, run_trial
+from towtank.trials.start import Setting, angle, fin_limit, setting
 from towtank.trials.steady import SteadyTurns, steady_turns
 from towtank.trials.trajectory import Trajectory
 
@@ -22,6 +21,8 @@ STEPS = (1.0, 0.7, 0.45, 0.3, 0.2, 0.1, 0.0)
 """Rudder steps as shares of the largest angle, closer towards amidships where a loop would be."""
 FIRST, EACH = 10.0, 5.0
 """Lengths travelled on the first step and on each of the others before the rate is read."""
+WATCHED = 0.25
+"""Share of a step, its last, over which the change of the rate says how steady the step was."""
 
 
 def spiral(
@@ -48,30 +49,96 @@ def spiral(
     Source     ittc75040201, direct (Dieudonne) spiral.
     Valid      The measured width is known to within one rudder step near its edges.
     """
+    return run_trial(model, spiral_ready(model, largest, speed, hold_depth, pilot))
+
+
+def spiral_ready(
+    model: Model,
+    largest: Quantity = "15 deg",
+    speed: Quantity | None = None,
+    hold_depth: bool = True,
+    pilot: Pilot | None = None,
+) -> Ready:
+    """The spiral, ready to fly; arguments as in ``spiral``."""
     limit = angle(largest, "largest", fin_limit(model), "the limit of the fins")
     s = setting(model, speed, pilot, piloted=hold_depth)
-    base = replace(s.helm, depth=0.0) if hold_depth else replace(s.helm, pilot=None)
     rudders = limit * np.array([*STEPS, *(-x for x in reversed(STEPS[:-1]))])
     sweep = np.concatenate([rudders, rudders[::-1][1:]])
-    # Turning slows the craft down, so a length takes longer than at the approach speed.
     turns = steady_turns(model, s.speed)
+    # Turning slows the craft down, so a length takes longer than at the approach speed.
     reached = np.abs(turns.rudder) <= 1.05 * abs(limit)
     convective = s.convective * s.speed / max(float(turns.speed[reached].min()), 0.3 * s.speed)
-    flight = free_run(model, s.state, _legs(base, sweep, convective), thrust=s.thrust, interval=s.convective / 8.0)
-    rate, change = _readings(flight, len(sweep))
-    count = min(len(rudders), len(rate))
-    down, up = rate[:count], rate[len(rudders) - 1 :][::-1]
-    complete = len(rate) == len(sweep)
-    indices = {
-        **(_loop(rudders, down, up) if complete else {}),
-        "residual_change": (change, "%"),
-        **_algebraic(turns),
+    return Ready(
+        name=f"spiral-{np.degrees(limit):g}deg", kind="spiral", loop="open", setting=s,
+        legs=_legs(s, sweep, float(hold_depth), convective), interval=s.convective / 8.0,
+        read=lambda flights: _indices(flights, rudders), alone=_algebraic(turns),
+        curves=lambda flights: _curves(flights, sweep, turns),
+    )  # fmt: skip
+
+
+def _legs(s: Setting, sweep: Array, dive: float, convective: float) -> tuple[Leg, ...]:
+    """Two legs for each step: until the rate is watched, and while it is."""
+    legs = []
+    for i, rudder in enumerate(sweep):
+        orders, lasting = s.orders(rudder=float(rudder), dive=dive), (EACH if i else FIRST) * convective
+        legs += [
+            Leg(f"step {i} settling", orders, (1.0 - WATCHED) * lasting), Leg(f"step {i}", orders, WATCHED * lasting),
+        ]  # fmt: skip
+    return tuple(legs)
+
+
+def _rates(flights: Flights, steps: int) -> tuple[Array, Array]:
+    """Turning rate (N, steps) [rad/s] at the end of every step, and its change over the part that is watched."""
+    end = np.stack([flights.at(f"step {i}", "turn", event=False) for i in range(steps)], axis=-1)
+    before = np.stack([flights.at(f"step {i} settling", "turn", event=False) for i in range(steps)], axis=-1)
+    return end, end - before
+
+
+def _indices(flights: Flights, rudders: Array) -> Readings:
+    rate, change = _rates(flights, 2 * len(rudders) - 1)
+    down, up = rate[:, : len(rudders)], rate[:, len(rudders) - 1 :][:, ::-1]
+    largest = np.fmax.reduce(np.abs(rate), axis=1)
+    with np.errstate(all="ignore"):
+        residual = 100.0 * np.fmax.reduce(np.abs(change), axis=1) / largest
+    # A craft that has not turned at all was steady.
+    return {**_loop(rudders, down, up), "residual_change": (np.where(largest == 0.0, 0.0, residual), "%")}
+
+
+def _loop(rudders: Array, down: Array, up: Array) -> Readings:
+    """Width, height and slope from the two sweeps (N, K) over the same rudder angles (K,); NaN unless all were run."""
+    middle = int(np.argmin(np.abs(rudders)))
+    mean = 0.5 * (down + up)
+    slope = (mean[:, middle + 1] - mean[:, middle - 1]) / (rudders[middle + 1] - rudders[middle - 1])
+    height = np.abs(down[:, middle] - up[:, middle])
+    missing = np.isnan(down).any(axis=1) | np.isnan(up).any(axis=1)
+    width = np.abs(_turnover(rudders, down) - _turnover(rudders, up))
+    return {
+        "loop_width": (np.where(missing, np.nan, np.degrees(width)), "deg"),
+        "loop_height": (np.where(missing, np.nan, np.degrees(height)), "deg/s"),
+        "slope": (np.where(missing, np.nan, slope), "1/s"),
     }
-    curves = {
+
+
+def _turnover(rudders: Array, rate: Array) -> Array:
+    """Rudder (N,) [rad] at which the yaw rate (N, K) of a sweep changes sign, by straight lines between the steps."""
+    turned = np.diff(np.sign(rate), axis=1) != 0.0
+    k, rows = np.argmax(turned, axis=1), np.arange(len(rate))
+    before, after = rate[rows, k], rate[rows, k + 1]
+    with np.errstate(all="ignore"):
+        at = rudders[k] - before * (rudders[k + 1] - rudders[k]) / (after - before)
+    return np.where(turned.any(axis=1), at, np.nan)
+
+
+def _curves(flights: Flights, sweep: Array, turns: SteadyTurns) -> dict[str, Any]:
+    """The measured curve of one craft, as far as it got, and the algebraic one."""
+    rate = _rates(flights, len(sweep))[0][0]
+    got = int(np.count_nonzero(~np.isnan(rate)))
+    down = min((len(sweep) + 1) // 2, got)
+    return {
         "spiral": {
-            "rudder": np.degrees(sweep[: len(rate)]),
-            "rate": np.degrees(rate),
-            "sweep": ["down"] * count + ["up"] * (len(rate) - count),
+            "rudder": np.degrees(sweep[:got]),
+            "rate": np.degrees(rate[:got]),
+            "sweep": ["down"] * down + ["up"] * (got - down),
         },
         "steady turns": {
             "rudder": np.degrees(turns.rudder),
@@ -80,53 +147,6 @@ def spiral(
             "speed": turns.speed,
         },
     }
-    return trajectory(
-        model, s, flight, name=f"spiral-{np.degrees(limit):g}deg", kind="spiral", loop="open", indices=indices,
-        curves=curves,
-    )  # fmt: skip
-
-
-def _legs(base: Helm, sweep: Array, convective: float) -> Iterator[Leg]:
-    for i, rudder in enumerate(sweep):
-        yield Leg(f"step {i}", replace(base, rudder=float(rudder)), (FIRST if i == 0 else EACH) * convective)
-
-
-def _readings(flight: Flight, steps: int) -> tuple[Array, float]:
-    """Turning rate [rad/s] at the end of each step, and its largest change over the last quarter [% of the largest]."""
-    rate, change = [], []
-    for i in range(steps):
-        inside = np.flatnonzero(flight.leg == i)
-        if len(inside) < 4:
-            break
-        heading, time = flight.state[inside, 5], flight.time[inside]
-        turning = np.gradient(heading, time)
-        rate.append(float(turning[-2]))
-        change.append(abs(float(turning[-2] - turning[-1 - len(inside) // 4])))
-    values = np.array(rate)
-    largest = float(np.abs(values).max()) if len(values) else 0.0
-    return values, 100.0 * max(change) / largest if largest > 0.0 else 0.0
-
-
-def _loop(rudders: Array, down: Array, up: Array) -> dict[str, tuple[float, str]]:
-    """Width, height and slope from the two sweeps over the same rudder angles."""
-    middle = int(np.argmin(np.abs(rudders)))
-    mean = 0.5 * (down + up)
-    slope = float((mean[middle + 1] - mean[middle - 1]) / (rudders[middle + 1] - rudders[middle - 1]))
-    width = abs(_turnover(rudders, down) - _turnover(rudders, up))
-    return {
-        "loop_width": (float(np.degrees(width)), "deg"),
-        "loop_height": (float(np.degrees(abs(down[middle] - up[middle]))), "deg/s"),
-        "slope": (slope, "1/s"),
-    }
-
-
-def _turnover(rudders: Array, rate: Array) -> float:
-    """Rudder [rad] at which the yaw rate of one sweep changes sign, by straight lines between the steps."""
-    i = np.flatnonzero(np.diff(np.sign(rate)) != 0)
-    if not len(i):
-        return float("nan")
-    k = int(i[0])
-    return float(rudders[k] - rate[k] * (rudders[k + 1] - rudders[k]) / (rate[k + 1] - rate[k]))
 
 
 def _algebraic(turns: SteadyTurns) -> dict[str, tuple[float, str]]:

@@ -9,21 +9,21 @@ import numpy as np
 
 from towtank.errors import TrialError
 from towtank.model.equations import Model
-from towtank.parallel import each
 from towtank.pilot.design import design_pilot
 from towtank.pilot.law import Pilot
 from towtank.progress import Progress, Silent
-from towtank.trials.circle import turning_circle
-from towtank.trials.mission import lawnmower
-from towtank.trials.pullout import pull_out
-from towtank.trials.spiral import spiral
+from towtank.trials.circle import circle_ready
+from towtank.trials.mission import lawnmower_ready
+from towtank.trials.pullout import pull_out_ready
+from towtank.trials.ready import Ready, run_trial
+from towtank.trials.spiral import spiral_ready
 from towtank.trials.start import ballasted, fin_limit, level_trim
-from towtank.trials.steps import depth_step, heading_step
-from towtank.trials.straight import straight_run
+from towtank.trials.steps import depth_step_ready, heading_step_ready
+from towtank.trials.straight import straight_ready
 from towtank.trials.trajectory import Trajectory
-from towtank.trials.zigzag import zigzag
+from towtank.trials.zigzag import zigzag_ready
 
-Trial = Callable[[Model, Pilot | None], Trajectory]
+Trial = Callable[[Model, Pilot | None], Ready]
 
 
 def within(model: Model, degrees: float) -> str:
@@ -32,32 +32,28 @@ def within(model: Model, degrees: float) -> str:
 
 
 OPEN_LOOP: dict[str, Trial] = {
-    "straight run": lambda m, p: straight_run(m, pilot=p),
-    "turning circle": lambda m, p: turning_circle(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
-    "zigzag 10/10": lambda m, p: zigzag(m, within(m, 10.0), "10 deg", pilot=p, hold_depth=p is not None),
-    "zigzag 20/20": lambda m, p: zigzag(m, within(m, 20.0), "20 deg", pilot=p, hold_depth=p is not None),
-    "zigzag 10/5 vertical": lambda m, p: zigzag(
+    "straight run": lambda m, p: straight_ready(m, pilot=p),
+    "turning circle": lambda m, p: circle_ready(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
+    "zigzag 10/10": lambda m, p: zigzag_ready(m, within(m, 10.0), "10 deg", pilot=p, hold_depth=p is not None),
+    "zigzag 20/20": lambda m, p: zigzag_ready(m, within(m, 20.0), "20 deg", pilot=p, hold_depth=p is not None),
+    "zigzag 10/5 vertical": lambda m, p: zigzag_ready(
         m, within(m, 10.0), "5 deg", plane="vertical", pilot=p, hold_depth=p is not None
     ),
-    "spiral": lambda m, p: spiral(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
-    "pull-out": lambda m, p: pull_out(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
+    "spiral": lambda m, p: spiral_ready(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
+    "pull-out": lambda m, p: pull_out_ready(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
 }
 """Trials with the rudder or elevator open loop. The pilot holds depth and damps roll where there is one."""
 
 CLOSED_LOOP: dict[str, Trial] = {
-    "heading step": lambda m, p: heading_step(m, "30 deg", pilot=p),
-    "depth step": lambda m, p: depth_step(m, pilot=p),
-    "lawnmower": lambda m, p: lawnmower(m, pilot=p),
+    "heading step": lambda m, p: heading_step_ready(m, "30 deg", pilot=p),
+    "depth step": lambda m, p: depth_step_ready(m, pilot=p),
+    "lawnmower": lambda m, p: lawnmower_ready(m, pilot=p),
 }
 """Trials under the pilot."""
 
 
 AS_LOADED = ("straight run",)
 """Trials run as the craft is loaded even when it cannot be flown level."""
-
-
-LONGEST_FIRST = ("spiral", "lawnmower", "depth step")
-"""Trials worth starting first when several processes share the work."""
 
 
 @dataclass(frozen=True)
@@ -69,34 +65,54 @@ class _Setting:
     pilot: Pilot | None
     notes: tuple[str, ...]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Trials that this craft can make."""
+        flown = tuple(OPEN_LOOP) if self.loaded.craft.fins else AS_LOADED
+        return flown if self.pilot is None else (*flown, *CLOSED_LOOP)
 
-def standard_trials(model: Model, progress: Progress | None = None, workers: int = 1) -> tuple[Trajectory, ...]:
+    def model(self, name: str) -> Model:
+        """The model that the trial called ``name`` is flown with."""
+        return self.loaded if name in AS_LOADED else self.neutral
+
+    def ready(self, name: str) -> Ready:
+        """The trial called ``name``."""
+        return {**OPEN_LOOP, **CLOSED_LOOP}[name](self.model(name), self.pilot)
+
+
+def standard_trials(model: Model, progress: Progress | None = None) -> tuple[Trajectory, ...]:
     """All standard trials of ``model`` at its craft's speed, with one pilot designed from it.
 
     A craft whose weight residual cannot be carried level at this speed is ballasted to neutral for its trials, as a
     crew would do; the straight run is made as loaded, so that the sinking is seen. A craft for which no pilot can be
     designed gets the open-loop trials only. A craft without fins gets the straight run. The trajectories' notes say so.
 
-    workers : processes that share the trials (see ``towtank.parallel``).
+    Raises
+    ------
+    InputError
+        The craft's speed is not positive.
+    """
+    progress, setting = progress or Silent(), _setting(model)
+    progress.start("trials", len(setting.names))
+    made = []
+    for name in setting.names:
+        trajectory = run_trial(setting.model(name), setting.ready(name))
+        made.append(trajectory if name in AS_LOADED else _noted(trajectory, setting.notes))
+        progress.step("trials", name)
+    progress.done("trials")
+    return tuple(made)
+
+
+def standard_ready(model: Model) -> tuple[tuple[Model, Ready], ...]:
+    """The trials of ``standard_trials``, ready to fly, each with the model it is flown with: loaded or ballasted.
 
     Raises
     ------
     InputError
         The craft's speed is not positive.
     """
-    progress = progress or Silent()
     setting = _setting(model)
-    names = list(OPEN_LOOP) if model.craft.fins else ["straight run"]
-    if setting.pilot is not None:
-        names += list(CLOSED_LOOP)
-    progress.start("trials", len(names))
-    made = {}
-    queue = sorted(names, key=lambda name: name not in LONGEST_FIRST)
-    for name, trajectory in zip(queue, each(_made, setting, queue, workers), strict=True):
-        made[name] = trajectory
-        progress.step("trials", name)
-    progress.done("trials")
-    return tuple(made[name] for name in names)
+    return tuple((setting.model(name), setting.ready(name)) for name in setting.names)
 
 
 def _setting(model: Model) -> _Setting:
@@ -109,10 +125,7 @@ def _setting(model: Model) -> _Setting:
         return _Setting(model, neutral, None, (*notes, f"No pilot: {error}"))
 
 
-def _made(setting: _Setting, name: str) -> Trajectory:
-    trial = {**OPEN_LOOP, **CLOSED_LOOP}[name]
-    if name in AS_LOADED:
-        return trial(setting.loaded, setting.pilot)
-    made = trial(setting.neutral, setting.pilot)
-    merged = [*made.provenance.get("notes", []), *setting.notes]
+def _noted(made: Trajectory, notes: tuple[str, ...]) -> Trajectory:
+    """``made`` with what has to be said of all trials."""
+    merged = [*made.provenance.get("notes", []), *notes]
     return replace(made, provenance={**made.provenance, "notes": merged})

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from towtank.engine.flights import Flights
+from towtank.engine.plan import Gauge, Leg, Stat
 from towtank.errors import InputError
-from towtank.frames import Array
+from towtank.frames import Array, rotation
 from towtank.model.equations import STILL, Model
 from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity, si
-from towtank.trials.integrate import Flight, Leg, free_run
-from towtank.trials.outcome import crossing, peak, trajectory
+from towtank.trials.ready import Readings, Ready, run_trial
 from towtank.trials.start import Setting, angle, setting
 from towtank.trials.trajectory import Trajectory
 
@@ -23,6 +23,8 @@ HEADING_LENGTHS, DEPTH_LENGTHS = 40.0, 70.0
 """Lengths travelled after the step."""
 BAND = 0.05
 """Share of the step within which the craft counts as settled."""
+LEVELS = (0.1, 0.9, 1.0 - BAND, 1.0 + BAND)
+"""Shares of the step at which a response is timed."""
 
 
 def heading_step(
@@ -50,16 +52,30 @@ def heading_step(
     InputError
         A change of zero, beyond 180 deg, or without a unit.
     """
+    return run_trial(model, heading_step_ready(model, change, speed, pilot, current, lengths))
+
+
+def heading_step_ready(
+    model: Model,
+    change: Quantity = "30 deg",
+    speed: Quantity | None = None,
+    pilot: Pilot | None = None,
+    current: Sequence[float] = STILL,
+    lengths: float = HEADING_LENGTHS,
+) -> Ready:
+    """The heading step, ready to fly; arguments as in ``heading_step``."""
     step = angle(change, "change", np.pi, "beyond which the other way round is shorter")
     if step == 0.0:
         raise InputError('change: a heading step of 0 deg tells nothing. Give an angle such as "30 deg".')
-    s = setting(model, speed, pilot)
-    flight = _run(model, s, current, lengths, (0.0, step), (0.0, 0.0))
-    indices = _response(s, flight, flight.state[:, 5], step, "deg", float(np.degrees(1.0)))
-    away = float(np.abs(flight.state[:, 2]).max())
-    return trajectory(
-        model, s, flight, name=f"heading-step-{np.degrees(step):g}deg", kind="heading step", loop="closed",
-        indices={**indices, "largest_depth_error": (away, "m")}, current=current,
+    s, away = setting(model, speed, pilot), Gauge("z", absolute=True)
+    return Ready(
+        name=f"heading-step-{np.degrees(step):g}deg", kind="heading step", loop="closed", setting=s,
+        legs=_legs(s, lengths, heading=step), interval=s.convective / 16.0, gauges=(*_gauges("psi", step), away),
+        start=adrift(s, current), current=drifting(current),
+        read=lambda flights: {
+            **_response(flights, "psi", step, "deg", float(np.degrees(1.0))),
+            "largest_depth_error": (flights.over(away, Stat.HIGH), "m"),
+        },
     )  # fmt: skip
 
 
@@ -85,48 +101,51 @@ def depth_step(
     InputError
         A change of zero.
     """
+    return run_trial(model, depth_step_ready(model, change, speed, pilot, current, lengths))
+
+
+def depth_step_ready(
+    model: Model,
+    change: Quantity | None = None,
+    speed: Quantity | None = None,
+    pilot: Pilot | None = None,
+    current: Sequence[float] = STILL,
+    lengths: float = DEPTH_LENGTHS,
+) -> Ready:
+    """The depth step, ready to fly; arguments as in ``depth_step``."""
     step = model.craft.length / 3.0 if change is None else si(change, "m", "change")
     if step == 0.0:
         raise InputError('change: a depth step of 0 m tells nothing. Give a distance such as "2 m".')
-    s = setting(model, speed, pilot)
-    flight = _run(model, s, current, lengths, (0.0, 0.0), (0.0, step))
-    indices = _response(s, flight, flight.state[:, 2], step, "m", 1.0)
-    away = float(np.degrees(np.abs(flight.state[:, 5]).max()))
-    return trajectory(
-        model, s, flight, name=f"depth-step-{step:.3g}m", kind="depth step", loop="closed",
-        indices={**indices, "largest_heading_error": (away, "deg")}, current=current,
+    s, away = setting(model, speed, pilot), Gauge("psi", absolute=True)
+    return Ready(
+        name=f"depth-step-{step:.3g}m", kind="depth step", loop="closed", setting=s,
+        legs=_legs(s, lengths, depth=step), interval=s.convective / 16.0, gauges=(*_gauges("z", step), away),
+        start=adrift(s, current), current=drifting(current),
+        read=lambda flights: {
+            **_response(flights, "z", step, "m", 1.0),
+            "largest_heading_error": (np.degrees(flights.over(away, Stat.HIGH)), "deg"),
+        },
     )  # fmt: skip
 
 
-def _run(
-    model: Model,
-    s: Setting,
-    current: Sequence[float],
-    lengths: float,
-    headings: tuple[float, float],
-    depths: tuple[float, float],
-) -> Flight:
-    start = s.state.copy()
-    # The craft is at rest in the moving water: speed over ground is speed through the water plus the current.
-    start[6:9] += adrift(s, current)
-    helm = replace(s.helm, current=drifting(current))
-    legs = [
-        Leg("before", replace(helm, heading=headings[0], depth=depths[0]), LEAD * s.convective),
-        Leg("after", replace(helm, heading=headings[1], depth=depths[1]), lengths * s.convective),
-    ]
-    return free_run(model, start, legs, thrust=s.thrust, interval=s.convective / 16.0, current=tuple(current))
+def _legs(s: Setting, lengths: float, **changed: float) -> tuple[Leg, Leg]:
+    """The old order, heading and depth zero, then the ``changed`` one."""
+    return (
+        Leg("before", s.orders(steer=1.0, dive=1.0), LEAD * s.convective),
+        Leg("after", s.orders(steer=1.0, dive=1.0, **changed), lengths * s.convective),
+    )
 
 
 def adrift(s: Setting, current: Sequence[float]) -> Array:
-    """Velocity of the water (3,) [m/s] in the body axes of the start.
+    """Start (12 + n,) of a craft at its approach speed through water that moves with ``current`` (3,) [m/s, NED].
+
+    The speed over ground is the speed through the water plus the current.
 
     Raises
     ------
     InputError
         Not three finite numbers, or a current as fast as the craft.
     """
-    from towtank.frames import rotation
-
     water = np.asarray(current, dtype=float)
     if water.shape != (3,) or not np.all(np.isfinite(water)):
         raise InputError(f"current {current!r}: give three finite numbers, north, east, down [m/s].")
@@ -135,7 +154,9 @@ def adrift(s: Setting, current: Sequence[float]) -> Array:
             f"current {np.linalg.norm(water):.3g} m/s is not below the craft's {s.speed:.3g} m/s; it cannot make way "
             "against it. Give a slower current or a higher speed."
         )
-    return np.asarray(rotation(s.state[3:6]).T @ water)
+    start = s.state.copy()
+    start[6:9] += rotation(s.state[3:6]).T @ water
+    return start
 
 
 def drifting(current: Sequence[float]) -> tuple[float, float, float]:
@@ -144,30 +165,24 @@ def drifting(current: Sequence[float]) -> tuple[float, float, float]:
     return north, east, down
 
 
-def _response(
-    s: Setting, flight: Flight, values: Array, step: float, unit: str, factor: float
-) -> dict[str, tuple[float, str]]:
-    """Rise, settling, overshoot and last error of a step."""
-    begin = flight.marks[0].time if flight.marks else 0.0
-    after = flight.within("after")
-    time, share = flight.time[after] - begin, values[after] / step
-    if len(time) < 8:
-        return {}
-    rise = crossing(time, share, 0.9) - crossing(time, share, 0.1)
-    outside = np.flatnonzero(np.abs(share - 1.0) > BAND)
-    settled = (
-        np.nan
-        if len(outside) and outside[-1] == len(share) - 1
-        else float(time[outside[-1] + 1])
-        if len(outside)
-        else 0.0
-    )
-    overshoot = max(peak(time, share)[1] - 1.0, 0.0)
-    size = abs(step) * factor
+def _gauges(channel: str, step: float) -> tuple[Gauge, ...]:
+    """Watches of ``channel`` at the ``LEVELS`` of ``step``, in their order."""
+    return tuple(Gauge(channel, share * step) for share in LEVELS)
+
+
+def _response(flights: Flights, channel: str, step: float, unit: str, factor: float) -> Readings:
+    """Rise, settling, overshoot and last error of a step; NaN where it was not flown to its end."""
+    low, high, inner, outer = _gauges(channel, step)
+    begin, share = flights.when("before", event=False), flights.at("after", channel, event=False) / step
+    rise = flights.stat("after", high, Stat.FIRST) - flights.stat("after", low, Stat.FIRST)
+    inside = np.abs(share - 1.0) <= BAND
+    left = np.fmax(flights.stat("after", inner, Stat.LAST), flights.stat("after", outer, Stat.LAST)) - begin
+    farthest = flights.stat("after", low, Stat.HIGH if step > 0.0 else Stat.LOW) / step
+    overshoot = np.maximum(farthest - 1.0, 0.0)
     return {
         "rise_time": (rise, "s"),
-        "settling_time": (settled, "s"),
-        "overshoot": (overshoot * size, unit),
+        "settling_time": (np.where(inside, left, np.nan), "s"),
+        "overshoot": (overshoot * abs(step) * factor, unit),
         "overshoot_share": (100.0 * overshoot, "%"),
-        "last_error": (float((share[-1] - 1.0) * step * factor), unit),
+        "last_error": ((share - 1.0) * step * factor, unit),
     }
