@@ -189,7 +189,7 @@ def test_the_point_of_all_bases_is_the_plain_chain():
     sweep = Sweep(craft, (Axis("fin_size", (1.0,)), Axis("cg_x", (craft.mass.cg[0],)), Axis("speed", (craft.speed,))))
     found = {name: value for name, (value, _) in numbers(evaluate(sweep.craft_at(sweep.points()[0]))).items()}
     model = Model(craft, derive(tow(standard_plan(craft), FastTank())))
-    trials = {trial.kind: trial for trial in standard_trials(model, workers=2)}
+    trials = {trial.kind: trial for trial in standard_trials(model)}
     verdict = assess(model, tuple(trials.values()))
     assert found["G_h"] == pytest.approx(verdict.horizontal.index, rel=1e-12)
     assert found["P_stable_v"] == pytest.approx(verdict.vertical.probability, rel=1e-12)
