@@ -43,6 +43,17 @@ class Task(ctypes.Structure):
     )  # fmt: skip
 
 
+class Slope(ctypes.Structure):
+    """The struct of ``c/slopes.c``: same fields, same order. It keeps no array alive; the caller does."""
+
+    _fields_ = (
+        ("p", _REALS), ("start", _REALS), ("ticks", _INTEGER), ("steps", _INTEGER), ("tick", _REAL), ("orders", _REALS),
+        ("row", _INTEGERS), ("channels", _INTEGER), ("channel", _INTEGERS), ("seen", _REALS), ("measured", _REALS),
+        ("weight", _REALS), ("misfit", _REALS), ("gradient", _REALS), ("start_gradient", _REALS),
+        ("directions", _INTEGER), ("direction", _INTEGERS), ("tangent", _REALS),
+    )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Library:
     """A loaded library: the path it came from, its target, and the compiled functions."""
@@ -136,4 +147,9 @@ def _loaded(path: Path, target: Target) -> Library:
     for name in ("run_one", "run_pack"):
         getattr(handle, name).restype = _INTEGER
         getattr(handle, name).argtypes = [ctypes.POINTER(Task)]
+    for name in ("misfit", "tangents"):
+        getattr(handle, name).restype = ctypes.c_int
+        getattr(handle, name).argtypes = [ctypes.POINTER(Slope)]
+    handle.jacobians.restype = None
+    handle.jacobians.argtypes = [_INTEGER, _REALS, _INTEGER, *[_REALS] * 6]
     return Library(path, target, handle)

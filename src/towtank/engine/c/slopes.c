@@ -268,10 +268,11 @@ __attribute__((visibility("default"))) int tangents(const Slope *a) {
   return 0;
 }
 
-/* Rates and their Jacobians at `count` points: A (count, NX, NX), B (count, NX, NF), G (count, NX, FREE); zero before. */
-__attribute__((visibility("default"))) void jacobians(int64_t count, const double *p, const double *x, const double *asked,
-                                                      double *rates, double *A, double *B, double *G) {
-  for (int64_t n = 0; n < count; n++, p += NP, x += NX, asked += NF, rates += NX, A += NX * NX, B += NX * NF, G += NX * FREE) {
+/* Rates and their Jacobians at `count` points: A (count, NX, NX), B (count, NX, NF), G (count, NX, FREE); zero before.
+   p_stride : NP, or 0 when the points share their parameters. */
+__attribute__((visibility("default"))) void jacobians(int64_t count, const double *p, int64_t p_stride, const double *x,
+                                                      const double *asked, double *rates, double *A, double *B, double *G) {
+  for (int64_t n = 0; n < count; n++, p += p_stride, x += NX, asked += NF, rates += NX, A += NX * NX, B += NX * NF, G += NX * FREE) {
     Local j;
     const double *W = p + INVERSE;
     dynamics(p, x, asked, rates);
