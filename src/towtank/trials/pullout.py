@@ -76,6 +76,7 @@ def pull_out_ready(
     return Ready(
         name=f"pull-out-{abs(np.degrees(dr)):g}deg", kind="pull-out", loop="open", setting=s, legs=legs,
         interval=s.convective / 16.0, read=lambda flights: {**_side(flights, "plus"), **_side(flights, "minus")},
+        needs=("turn",),
     )  # fmt: skip
 
 

@@ -46,6 +46,7 @@ class Ready:
     read : flights of N craft -> the trial's own indices.   status : flights of one craft -> why its numbers are not
     complete, or None.   curves : flights of one craft -> plain series that belong to the trial.
     start : state (12 + n,) where it is not the setting's.   alone : indices of one craft that are not flown.
+    needs : channels whose record ``read`` takes; a Monte Carlo study keeps no others.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Ready:
     curves: Callable[[Flights], Mapping[str, Any]] = lambda flights: {}
     start: Array | None = None
     alone: Mapping[str, tuple[float, str]] | None = None
+    needs: tuple[str, ...] = ()
 
 
 def clock_of(model: Model, speed: float) -> Clock:
@@ -70,11 +72,17 @@ def clock_of(model: Model, speed: float) -> Clock:
     return Clock(tick, max(2, math.ceil(tick / (STEP_PER_LAG * lag) - 1e-9)))
 
 
-def fly_ready(model: Model, trial: Ready, ensemble: Ensemble = ONE, *, record: bool = True, **options: Any) -> Flights:
-    """Fly ``trial``. ``record`` keeps all channels at its interval; ``options`` go to ``towtank.engine.run.fly``."""
+def fly_ready(
+    model: Model, trial: Ready, ensemble: Ensemble = ONE, *, record: bool | Log = True, **options: Any
+) -> Flights:
+    """Fly ``trial``. ``options`` go to ``towtank.engine.run.fly``.
+
+    record : True keeps all channels at its interval, False nothing, a ``Log`` what it says.
+    """
     clock = clock_of(model, trial.setting.speed)
     state = trial.setting.state if trial.start is None else trial.start
-    log = Log(every=max(1, round(trial.interval / clock.tick))) if record else None
+    every = Log(every=max(1, round(trial.interval / clock.tick)))
+    log = record if isinstance(record, Log) else every if record else None
     return fly(
         model, at(state, trial.setting.memory), trial.legs, thrust=trial.setting.thrust, pilot=trial.setting.pilot,
         current=trial.current, clock=clock, log=log, gauges=(*COMMON, *trial.gauges), ensemble=ensemble, **options,

@@ -64,6 +64,7 @@ def straight_ready(
     return Ready(
         name="straight", kind="straight run", loop="open", setting=s, legs=(leg,), start=start,
         interval=s.convective / SAMPLES, read=lambda flights: _indices(s, flights),
+        needs=("v", "r"),
     )  # fmt: skip
 
 
