@@ -14,8 +14,9 @@ import cluster_cases as cases
 import pytest
 
 from towtank.cluster.ledger import Failed, open_ledger
-from towtank.cluster.work import Stopped, Task, _kept, each_once
+from towtank.cluster.work import Stopped, Task, each_once
 from towtank.errors import ArtefactError, InputError, TowtankError
+from towtank.progress import Silent
 
 ITEMS = list(range(12))
 KEYS = [f"item-{item}" for item in ITEMS]
@@ -104,17 +105,20 @@ def test_an_item_that_kills_its_worker_every_time_fails_alone(how: dict[str, Any
     assert run(tmp_path, items=[0, 1, 2, 3])[2]["square"] == 4
 
 
-def test_a_worker_that_does_not_see_the_ledger_sends_its_result(tmp_path: Path):
+def test_workers_that_do_not_see_the_ledger_send_their_results(how: dict[str, Any], tmp_path: Path):
     """The mark of the ledger decides, not the path: without it the folder is taken for another one."""
-    book = open_ledger(tmp_path / "ledger")
-    task = Task(cases.square, tmp_path / "log", book)
-    (tmp_path / "ledger" / ".ledger.json").unlink()
-    answer = task(("item-4", 4))
-    assert answer[1] is False
-    assert _kept(book, "item-4", answer) == book.find("item-4")
+
+    class Unmarking(Silent):
+        def start(self, task: str, total: int) -> None:
+            (tmp_path / "ledger" / ".ledger.json").unlink()
+
+    first = run(tmp_path, items=[4, 5, 13], progress=Unmarking(), **how)
+    assert (first[0]["square"], first[1]["square"]) == (16, 25)
+    assert run(tmp_path, items=[4, 5, 13]) == first
+    assert set(cases.counted(tmp_path / "log")[0].values()) == {1}
 
 
-def test_an_interruption_keeps_what_is_finished_and_says_how_to_go_on(tmp_path: Path):
+def test_an_interruption_keeps_what_is_finished_and_says_how_to_go_on(how: dict[str, Any], tmp_path: Path):
     class Interrupting:
         seen = 0
 
@@ -131,7 +135,7 @@ def test_an_interruption_keeps_what_is_finished_and_says_how_to_go_on(tmp_path: 
 
     spy = Interrupting()
     with pytest.raises(Stopped, match=r"stopped after 5 of 12.*ask again") as caught:
-        run(tmp_path, workers=2, progress=spy)
+        run(tmp_path, progress=spy, **how)
     assert isinstance(caught.value.__context__, KeyboardInterrupt)
     assert spy.ended
     finished = set(cases.counted(tmp_path / "log")[1])
@@ -185,6 +189,15 @@ def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest
     empty = distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50)
     with empty, pytest.raises(InputError, match="has no workers"):
         run(tmp_path, where=empty.scheduler_address)
+
+
+def test_a_cluster_with_another_version_is_refused_before_any_work(
+    tmp_path: Path, cluster: Any, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("towtank.cluster.dask.VERSION", "9.9")
+    with pytest.raises(InputError, match=r"has towtank 0\.\d.*this is 9\.9"):
+        run(tmp_path, where=cluster.scheduler_address)
+    assert cases.lines(tmp_path / "log") == []
 
 
 def test_a_scheduler_that_goes_away_is_told_and_what_is_finished_stays(tmp_path: Path):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from towtank.cluster.crew import Perished
 from towtank.errors import InputError, TowtankError
+from towtank.provenance import VERSION
 
 if TYPE_CHECKING:
     from towtank.cluster.work import Task
@@ -83,10 +84,6 @@ def _round(client: Any, task: Task, keyed: Mapping[int, tuple[str, Any]]) -> Ite
                 f"the Dask scheduler went away with {len(futures) + 1} items to do. What is finished is whole in "
                 f"{task.ledger.root}; start a scheduler and ask again to go on."
             ) from None
-        except ModuleNotFoundError as error:
-            raise Lost(
-                f"a worker or the scheduler cannot load the work ({error}). Install towtank {task.version} there too."
-            ) from None
         # A result that nobody holds is not worked out again when the worker that holds it dies.
         future.release()
         yield number, answer
@@ -105,13 +102,28 @@ def _client(address: Any, where: str) -> AbstractContextManager[Any]:
 
 
 def _manned(client: Any, where: str) -> None:
-    """See to it that a running scheduler has a worker; jobs of Slurm may wait as long as the queue is."""
+    """See to it that a running scheduler has workers fit for the work; jobs of Slurm may wait long in their queue."""
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
         raise InputError(
             f"the Dask scheduler at {where} has no workers. Start some with `dask worker {where}` and ask again."
         ) from None
+
+    def version() -> str:  # a function inside a function travels whole: it runs where there is no towtank
+        try:
+            from towtank.provenance import VERSION
+        except ImportError:
+            return "none"
+        return VERSION
+
+    found = {**client.run(version), "the scheduler": client.run_on_scheduler(version)}
+    for place, there in found.items():
+        if there != VERSION:
+            raise InputError(
+                f"{place} of the Dask cluster at {where} has towtank {there}, this is {VERSION}. Results of two "
+                "versions do not belong together, and a worker without the package ends. Install the same everywhere."
+            )
 
 
 def slurm_cluster(jobs: int, settings: Mapping[str, Any]) -> AbstractContextManager[Any]:
