@@ -62,7 +62,8 @@ def lawnmower(
     depth : below the start, [m] or text.   speed : through the water.   current : (3,) [m/s, NED].
 
     Indices: rms and largest distance off the long legs after the craft has come onto them (half a leg, and to the end)
-    [m], rms over all of the long legs [m], rms depth error on them [m], time [s], distance [m], effort of the fins.
+    [m], rms over all of the long legs [m], rms depth error where the craft has come on [m], distance [m], effort of the
+    fins.
 
     Raises
     ------
@@ -188,7 +189,7 @@ def _indices(flights: Flights, pieces: Sequence[_Piece], depth: float) -> Readin
         "off_track_rms": (_rms(over(_ACROSS, Stat.SQUARE), lasting, settled), "m"),
         "off_track_largest": (np.fmax.reduce(over(_ACROSS, Stat.HIGH)[:, settled], axis=1, initial=np.nan), "m"),
         "off_track_rms_whole": (_rms(over(_ACROSS, Stat.SQUARE), lasting, long_), "m"),
-        "depth_error_rms": (_rms(deep, lasting, long_), "m"),
+        "depth_error_rms": (_rms(deep, lasting, settled), "m"),
         "distance": (flights.over(SPEED, Stat.INTEGRAL), "m"),
     }
 
