@@ -2,27 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.engine.flights import Flights
-from towtank.engine.plan import Ended
+from towtank.engine.plan import Ended, Log
 from towtank.engine.run import Ensemble
 from towtank.engine.start import at
 from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.montecarlo.draw import Drawn, Tolerances, draw, starts
-from towtank.montecarlo.stable import stability
-from towtank.trials.ready import Ready, fly_ready, readings
+from towtank.montecarlo.draw import CURRENT, Drawn, Tolerances, draw, starts
+from towtank.montecarlo.stable import neutral, stability
+from towtank.progress import Progress, Silent
+from towtank.trials.ready import Ready, clock_of, fly_ready, readings
 
 BAND_CHANNELS = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "r", "rudder", "elevator", "speed")
 """Channels whose bands are kept over time, where the first piece of a study is flown."""
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-LEAST = 20
-"""Craft that must still be under way for a band to be stated."""
+UNDER_WAY = 0.9
+"""Share of the craft that must still fly for a band to be stated; later it would be one of the slow craft only."""
+LOGGED, KEPT = 1200, 300
+"""Samples over the longest time a trial may take, and of a band."""
+TRACKS = 40
+"""Craft of the first piece whose tracks are kept."""
+RAN_AWAY = (Ended.NOT_FINITE, Ended.TOO_FAST)
+
+Trials = Sequence[tuple[Model, Ready]]
+Recipe = Callable[[Model], Trials]
+"""What makes the trials of a model ready; a function of a module where other processes are to work."""
 
 
 @dataclass(frozen=True)
@@ -33,64 +45,151 @@ class Piece:
     count: int
 
 
+_READY: dict[str, tuple[tuple[Model, Ready], ...]] = {}
+"""Key of the study at hand -> its trials; they hold functions and are made anew in every process."""
+
+
 @dataclass(frozen=True)
 class Study:
-    """What all pieces share: the trials with the model each is flown with, tolerances, seed."""
+    """What all pieces share. Can be pickled; what hears of the progress stays behind.
+
+    key : name of all that decides the numbers.   root : of the covariance, taken once so that all draw the same.
+    """
 
     model: Model
-    trials: tuple[tuple[Model, Ready], ...]
+    recipe: Recipe
     given: Tolerances
     seed: int
+    root: Array
+    key: str
+    told: Progress = field(default_factory=Silent)
+
+    @property
+    def trials(self) -> tuple[tuple[Model, Ready], ...]:
+        """The trials, each with the model it is flown with."""
+        return _READY[self.key] if self.key in _READY else hold(self.key, self.recipe(self.model))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "told": Silent()}
+
+
+def hold(key: str, trials: Trials) -> tuple[tuple[Model, Ready], ...]:
+    """Keep the trials of the study ``key`` in this process, in the place of those of another."""
+    _READY.clear()
+    _READY[key] = tuple(trials)
+    return _READY[key]
 
 
 def fly_piece(study: Study, piece: Piece) -> dict[str, Any]:
-    """Numbers of one piece, as plain lists so that they can be kept in a file or sent.
+    """Numbers of one piece, as plain lists so that they can be kept in a file or sent; NaN is None.
 
-    "trials" : name -> {"indices": name -> {"unit", "values" (count)}, "ended" (count)}; "stability" : plane -> (count);
-    in the first piece, "bands": name -> {"time", channel -> (quantiles, samples)}.
+    "trials" : name -> {"kind", "loop", "indices": name -> {"unit", "values" (count)}, "ended" (count)};
+    "stability" : name -> (count). In the first piece the best estimate comes before the ``count`` craft, and "bands"
+    are stated: name -> as ``bands`` returns.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The flights were stopped: nothing of the piece is kept.
     """
-    drawn = draw(study.model, piece.count, study.given, study.seed, piece.number)
-    out: dict[str, Any] = {"trials": {}, "stability": stability(study.model, drawn.columns), "bands": {}}
+    drawn = draw(study.model, piece.count, study.given, study.seed, piece.number, study.root)
+    stable = {name: plain(values) for name, values in stability(study.model, drawn.columns).items()}
+    out: dict[str, Any] = {"trials": {}, "stability": stable, "bands": {}}
+    task = f"piece {piece.number + 1}"
+    study.told.start(task, len(study.trials))
     for model, trial in study.trials:
-        flights = fly_drawn(model, trial, drawn)
+        flights = fly_drawn(model, trial, drawn, record(model, trial, piece.number == 0))
+        away: NDArray[np.bool_] = np.isin(flights.ended, RAN_AWAY)
         read = readings(model, trial, flights)
         out["trials"][trial.name] = {
-            "indices": {name: {"unit": unit, "values": _plain(values)} for name, (values, unit) in read.items()},
+            "kind": trial.kind,
+            "loop": trial.loop,
+            # A craft that ran away left the range of its derivatives: none of its numbers count.
+            "indices": {
+                name: {"unit": unit, "values": plain(np.where(away, np.nan, values))}
+                for name, (values, unit) in read.items()
+            },
             "ended": [Ended(int(code)).name.lower() for code in flights.ended],
         }
         if piece.number == 0:
-            out["bands"][trial.name] = bands(flights)
+            out["bands"][trial.name] = bands(flights, away)
+        study.told.step(task, trial.name)
+    study.told.done(task)
     return out
 
 
-def fly_drawn(model: Model, trial: Ready, drawn: Drawn) -> Flights:
-    """``trial`` flown by the ``drawn`` craft, all under the pilot of the best estimate.
+def record(model: Model, trial: Ready, first: bool) -> Log | bool:
+    """What is kept over time: what the readings need; in the first piece the channels of the bands."""
+    clock = clock_of(model, trial.setting.speed)
+    own = max(1, round(trial.interval / clock.tick))
+    if trial.needs:
+        return Log(tuple(dict.fromkeys((*trial.needs, *(BAND_CHANNELS if first else ())))), own)
+    longest = sum(leg.within for leg in trial.legs)
+    return Log(BAND_CHANNELS, max(own, math.ceil(longest / clock.tick / LOGGED))) if first else False
+
+
+def fly_drawn(model: Model, trial: Ready, drawn: Drawn, kept: Log | bool = True) -> Flights:
+    """``trial`` flown by the ``drawn`` craft, all under the pilot, the trim and the thrust of the best estimate.
 
     A model that was ballasted to neutral stays so: its displaced mass goes with its mass.
+
+    Valid      Inertia about the origin stays that of the best estimate when mass or CG are drawn.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Interrupted before every craft was through.
     """
     columns = dict(drawn.columns)
-    body = model.constants.body
-    if body.b == body.m:
+    if neutral(model):
         columns["b"] = columns["m"]
-    for i, name in enumerate(("current_north", "current_east")):
+    for i, name in enumerate(CURRENT):
         columns[name] = columns[name] + trial.current[i]
     start = at(trial.setting.state if trial.start is None else trial.start, trial.setting.memory)
     # The trial's own current is in its start already.
     begin = starts(start, drawn.columns)
-    return fly_ready(model, trial, Ensemble(len(drawn), columns, begin))
+    flights = fly_ready(model, trial, Ensemble(len(drawn), columns, begin), record=kept)
+    if np.any(flights.ended == Ended.STOPPED):
+        raise KeyboardInterrupt
+    return flights
 
 
-def bands(flights: Flights) -> dict[str, Any]:
-    """Quantiles over the craft at every sample: channel -> (len(QUANTILES), S); S ends where fewer than LEAST fly."""
-    flying = np.count_nonzero(~np.isnan(flights.log[:, :, 0]), axis=0)
-    size = (
-        int(np.argmax(flying < min(LEAST, len(flights)))) if np.any(flying < min(LEAST, len(flights))) else len(flying)
-    )
-    out: dict[str, Any] = {"time": flights.time[:size].tolist()}
-    for name in BAND_CHANNELS:
-        values = flights.series(name)[:, :size]
-        out[name] = np.nanquantile(values, QUANTILES, axis=0).tolist() if size else []
-    return out
+def bands(flights: Flights, away: NDArray[np.bool_]) -> dict[str, Any]:
+    """Quantiles over the drawn craft at every sample, the best estimate being the first craft.
+
+    "time" (S), "under_way" (S) share of the craft, "quantiles": channel -> (len(QUANTILES), S), "best": channel ->
+    (S), "tracks": "x", "y" -> (up to TRACKS, S). S ends where less than ``UNDER_WAY`` fly. Seven digits are kept.
+    """
+    log = np.where(away[:, None, None], np.nan, flights.log)
+    flying = ~np.isnan(log[1:, :, 0])
+    share = flying.mean(axis=0) / max(float((~away[1:]).mean()), 1.0 / len(flights))
+    size = int(np.argmax(share < UNDER_WAY)) if np.any(share < UNDER_WAY) else len(share)
+    at_ = slice(0, size, max(1, math.ceil(size / KEPT)))
+    series = {name: log[:, at_, flights.logged.index(name)] for name in BAND_CHANNELS}
+    return {
+        "time": short(flights.time[at_]),
+        "under_way": short(share[at_]),
+        "quantiles": {name: [short(row) for row in quantiles(values[1:])] for name, values in series.items()},
+        "best": {name: short(values[0]) for name, values in series.items()},
+        "tracks": {name: [short(row) for row in series[name][1 : TRACKS + 1]] for name in ("x", "y")},
+    }
+
+
+def quantiles(values: Array, at_: Sequence[float] = QUANTILES) -> Array:
+    """Quantiles (len(at_), ...) over the first axis, of what is not NaN; NaN where nothing is.
+
+    Source     Linear between the order statistics, as numpy's default.
+    """
+    ordered = np.sort(values, axis=0)
+    count = np.count_nonzero(~np.isnan(values), axis=0)
+    out = []
+    for q in at_:
+        place = q * np.maximum(count - 1, 0)
+        low = np.floor(place).astype(np.int64)
+        high = np.minimum(low + 1, np.maximum(count - 1, 0))
+        a, b = (np.take_along_axis(ordered, i[None], axis=0)[0] for i in (low, high))
+        out.append(np.where(count > 0, a + (place - low) * (b - a), np.nan))
+    return np.array(out)
 
 
 def pieces(samples: int, size: int) -> Sequence[Piece]:
@@ -98,22 +197,35 @@ def pieces(samples: int, size: int) -> Sequence[Piece]:
     return [Piece(i, min(size, samples - first)) for i, first in enumerate(range(0, samples, size))]
 
 
-def _plain(values: Array) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
+def plain(values: Array) -> list[float | None]:
+    """Numbers as JSON holds them."""
+    return [value if math.isfinite(value) else None for value in np.asarray(values, dtype=float).tolist()]
 
 
-def merged(answers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Pieces in order as one: values end to end, bands of the first."""
-    first = answers[0]
+def short(values: Array) -> list[float | None]:
+    """As ``plain``, with seven significant digits: enough to draw."""
+    return [float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist()]
+
+
+def numbers(values: Sequence[float | None]) -> Array:
+    """Array of what ``plain`` or ``short`` wrote."""
+    return np.array([math.nan if value is None else value for value in values], dtype=float)
+
+
+def gathered(answers: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
+    """Pieces by number as one, in order: arrays end to end (N,), reasons as lists, bands of the first piece."""
+    ordered = [answers[i] for i in sorted(answers)]
+    first = ordered[0]
     trials: dict[str, Any] = {}
     for name, trial in first["trials"].items():
-        parts = [answer["trials"][name] for answer in answers]
-        trials[name] = {
-            "indices": {
-                key: {"unit": entry["unit"], "values": [x for part in parts for x in part["indices"][key]["values"]]}
-                for key, entry in trial["indices"].items()
-            },
-            "ended": [x for part in parts for x in part["ended"]],
+        parts = [answer["trials"][name] for answer in ordered]
+        values = {
+            key: (np.concatenate([numbers(part["indices"][key]["values"]) for part in parts]), entry["unit"])
+            for key, entry in trial["indices"].items()
         }
-    stable = {key: [x for answer in answers for x in answer["stability"][key]] for key in first["stability"]}
+        ended = [reason for part in parts for reason in part["ended"]]
+        trials[name] = {"kind": trial["kind"], "loop": trial["loop"], "indices": values, "ended": ended}
+    stable = {
+        key: np.concatenate([numbers(answer["stability"][key]) for answer in ordered]) for key in first["stability"]
+    }
     return {"trials": trials, "stability": stable, "bands": first["bands"]}
