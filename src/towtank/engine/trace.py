@@ -101,7 +101,8 @@ def slopes_header(trace: Traced) -> str:
 
     moved = ca.dot(bar["x"], e.direct) + ca.dot(through, e.load)
     shifted = ca.dot(bar["x"], e.direct) + ca.dot(through, balanced)
-    watched, (_, asked, remembered, _) = ca.dot(bar["seen"], e.seen), e.steered
+    seen = _smooth_seen(form, v)
+    watched, (_, asked, remembered, _) = ca.dot(bar["seen"], seen), e.steered
     steered = ca.dot(bar["asked"], asked) + ca.dot(bar["memory"], remembered)
     both = ca.vertcat(asked, remembered)
     functions = [
@@ -113,7 +114,7 @@ def slopes_header(trace: Traced) -> str:
         ("dynamics_jac", [v.p, v.x, v.asked],
          [*(ca.jacobian(e.direct, x) for x in (v.x, v.asked, theta)), ca.jacobian(e.load, v.x),
           known(ca.jacobian(balanced, theta))]),
-        ("observe_jac", [v.p, v.x, v.orders], [ca.jacobian(e.seen, x) for x in (v.x, theta)]),
+        ("observe_jac", [v.p, v.x, v.orders], [ca.jacobian(seen, x) for x in (v.x, theta)]),
         ("steer_jac", [v.p, v.seen, v.memory, v.orders], [ca.jacobian(both, x) for x in (v.seen, v.memory, theta)]),
     ]  # fmt: skip
     lines = [f"/* {form.word} */", f"#define FREE {free}"]
@@ -122,6 +123,20 @@ def slopes_header(trace: Traced) -> str:
         lines.append(c_function(function)[0])
         lines += [c_pattern(f"{name}{i}", function.sparsity_out(i)) for i in range(function.n_out())]
     return "\n".join([*lines, ""])
+
+
+def _smooth_seen(form: Form, v: Any) -> Any:
+    """The channels with an arc tangent that has a slope at (0, 0) too, which a craft at rest or upright meets."""
+    import casadi as ca
+
+    ops = casadi_ops()
+
+    def atan2(y: Any, x: Any) -> Any:
+        return ca.atan2(y, x + ca.logic_not(ca.SX(x * x + y * y) > 0))
+
+    p, x, orders = ([column[i] for i in range(column.numel())] for column in (v.p, v.x, v.orders))
+    smooth = cast(Ops, SimpleNamespace(**{**vars(ops), "atan2": atan2}))
+    return ca.vertcat(*observe(system(form, p), x, orders, smooth))
 
 
 def _mass(k: Constants) -> Any:
