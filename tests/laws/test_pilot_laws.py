@@ -14,18 +14,22 @@ from hypothesis import strategies as st
 
 import synthetic_craft as synthetic
 from towtank.craft.library import read_craft
+from towtank.engine.form import System
+from towtank.engine.loop import command, dynamics, observe
+from towtank.engine.plan import Gauge, Leg, Stat
+from towtank.engine.run import fly
+from towtank.engine.start import at
 from towtank.errors import ArtefactError, InputError, TrialError
 from towtank.model.algebra import MATH, NUMPY
 from towtank.model.linear import horizontal
 from towtank.pilot.allocation import ELEVATOR_FIRST, ROUND_OFF, RUDDER_FIRST, YAW_AND_PITCH_FIRST, allocation, share
 from towtank.pilot.design import design_pilot
-from towtank.pilot.effort import effort
 from towtank.pilot.files import UNITS, read_pilot, write_pilot
 from towtank.pilot.guidance import across, along, line, line_of_sight
 from towtank.pilot.law import GAINS, NO_PILOT, Pilot, Seen, authority, steer, wrapped
 from towtank.pilot.orders import ORDERS, Orders
-from towtank.trials.integrate import Leg, free_run
 from towtank.trials.mission import lawnmower
+from towtank.trials.ready import Ready, fly_ready, readings
 from towtank.trials.start import setting
 from towtank.trials.steps import depth_step, heading_step
 
@@ -61,17 +65,20 @@ def test_eigenvalues_of_the_design_are_those_of_the_flying_law():
     # is put near the axis, because the loops are designed one by one and a low CG couples sway with roll.
     unstable = synthetic.model(synthetic.SUBOFF, zg=0.001)
     s = setting(unstable, 1.0)
-    helm = replace(s.helm, heading=0.0, depth=0.0)
+    system = System(unstable.constants, s.pilot, s.thrust, (0.0, 0.0, 0.0), 0.25)
+    orders, mixing = s.orders(steer=1.0, dive=1.0), allocation(unstable.craft)
 
     def rates(y):
-        command, own = helm.order(list(y[:16]), list(y[16:]))
-        return np.array([*unstable.rates(list(y[:16]), helm.allocation.fins(command), s.thrust), *own])
+        x, memory = list(y[:17]), list(y[17:])
+        ordered = [getattr(orders, name) for name in ORDERS]
+        out = command(system, observe(system, x, ordered, MATH), memory, ordered, MATH)
+        return np.array([*dynamics(system, x, mixing.fins(out.granted), MATH), *out.memory_rates])
 
-    step = 1e-7
-    slope = np.array([(rates(s.state + step * e) - rates(s.state - step * e)) / (2.0 * step) for e in np.eye(19)]).T
+    step, start = 1e-7, at(s.state, s.memory)
+    slope = np.array([(rates(start + step * e) - rates(start - step * e)) / (2.0 * step) for e in np.eye(20)]).T
     found = np.linalg.eigvals(slope)
     for loop in ("heading", "depth", "roll"):
-        for value in s.helm.pilot.eigenvalues[loop]:
+        for value in s.pilot.eigenvalues[loop]:
             assert np.abs(found - value).min() < 0.005 * abs(value), (loop, value)
 
 
@@ -100,8 +107,7 @@ def test_heading_errors_take_the_short_way(angle):
 def test_fins_never_exceed_limit_nor_rate(unstable):
     quick = synthetic.model(synthetic.SUBOFF, rate=5.0, limit=15.0)
     trial = heading_step(quick, "120 deg", lengths=15.0)
-    # The integrator's interpolation between steps may pass a corner by its tolerance, 1e-4 of a radian per step.
-    assert np.abs(trial.delta).max() <= np.radians(15.0) + 2e-3
+    assert np.abs(trial.delta).max() <= np.radians(15.0) * (1.0 + 1e-12)
     swing = np.abs(np.diff(trial.delta, axis=0)) / np.diff(trial.time)[:, None]
     assert swing.max() <= np.radians(5.0) * 1.02
     assert trial.indices["fin_saturation"][0] > 1.0  # the step was large enough to try the limit
@@ -116,10 +122,10 @@ def test_heading_step_settles_without_error_in_a_current(unstable):
 
 def test_a_uniform_current_does_not_change_the_motion_through_the_water(unstable):
     still, moving = (heading_step(unstable, current=c, lengths=15.0) for c in ((0.0, 0.0, 0.0), (0.3, -0.2, 0.0)))
-    # Same equations in a moving frame; the two integrations choose different steps.
-    assert moving.attitude == pytest.approx(still.attitude, abs=1e-3)
+    # Same equations in a moving frame.
+    assert moving.attitude == pytest.approx(still.attitude, abs=1e-9)
     drift = moving.position - still.position
-    assert drift[-1, :2] == pytest.approx(np.array([0.3, -0.2]) * moving.time[-1], abs=0.05)
+    assert drift[:, :2] == pytest.approx(np.outer(moving.time, [0.3, -0.2]), abs=1e-6)
 
 
 def test_depth_step_with_net_weight_has_no_lasting_error():
@@ -132,12 +138,12 @@ def test_depth_step_with_net_weight_has_no_lasting_error():
 def test_the_integral_takes_out_a_weight_the_trim_does_not_know():
     heavy = synthetic.model(synthetic.SUBOFF, net_buoyancy=-0.2, speed=2.0)
     s = setting(heavy, None)
-    start = s.state.copy()
-    start[17] = 0.0  # the elevator's trim forgotten
-    leg = Leg("hold", replace(s.helm, heading=0.0, depth=0.0), 110.0 * s.convective)
-    flight = free_run(heavy, start, [leg], thrust=s.thrust, interval=s.convective)
-    assert np.abs(flight.state[:, 2]).max() > 0.1
-    assert abs(flight.state[-1, 2]) < 0.02
+    leg = Leg("hold", s.orders(steer=1.0, dive=1.0), 110.0 * s.convective)
+    forgotten, off = at(s.state), Gauge("z", absolute=True)
+    assert s.memory[1] != 0.0
+    flights = fly(heavy, forgotten, [leg], thrust=s.thrust, pilot=s.pilot, gauges=[off])
+    assert flights.stat("hold", off, Stat.HIGH)[0] > 0.1
+    assert abs(flights.at("hold", "z", event=False)[0]) < 0.02
 
 
 def test_saturation_does_not_wind_up(unstable):
@@ -162,12 +168,25 @@ def test_the_lawnmower_keeps_its_legs(unstable):
 
 
 def test_effort_of_a_known_fin_motion():
-    time = np.linspace(0.0, 10.0, 2001)
-    delta = np.radians(10.0) * np.sin(2.0 * np.pi * time)[:, None]
-    out = effort(time, delta, np.tile([2.0, 0.0, 0.0], (len(time), 1)), [np.radians(25.0)])
-    assert out["fin_rms"][0] == pytest.approx(10.0 / np.sqrt(2.0), rel=1e-3)
-    assert out["fin_travel"][0] == pytest.approx(40.0 * 10.0 / 20.0, rel=1e-3)  # 40 deg a cycle, 10 cycles, 20 m
-    assert out["fin_saturation"][0] == 0.0
+    # A rudder of -25 deg, the limit, from rest, then of +10 deg; nothing limits the fins' rate. Each is 50 lags long,
+    # so that a fin is where it is asked to be at the end of it. Over a lag T the square of a + b exp(-t/T) has the
+    # integral a^2 t + 2 a b T + b^2 T / 2.
+    craft = synthetic.model(synthetic.STABLE, rate=1e6)
+    s, lag = setting(craft, None, piloted=False), 0.2
+    first, then, lasting = 25.0, -10.0, 50.0 * lag
+    legs = tuple(Leg(str(a), s.orders(rudder=-np.radians(a)), lasting) for a in (first, then))
+    trial = Ready("effort", "effort", "open", s, legs, 1.0, read=lambda flights: {})
+    flights = fly_ready(craft, trial)
+    out = readings(craft, trial, flights)
+    swing = first - then
+    square = first**2 * (lasting - 1.5 * lag) + then**2 * lasting + 2.0 * then * swing * lag + swing**2 * lag / 2.0
+    path = flights.over(Gauge("speed"), Stat.INTEGRAL)
+    assert out["fin_rms"][0] == pytest.approx(np.sqrt(square / (2.0 * lasting)), rel=1e-3)
+    assert out["fin_largest"][0] == pytest.approx(first, rel=1e-6)
+    assert out["fin_travel"][0] == pytest.approx((first + swing) / path, rel=1e-6)
+    # Within 0.5 % of the limit from ln(200) lags on until shortly after the swing back; known to a control period.
+    full = lasting - lag * np.log(200.0) + lag * np.log(swing / (swing - 0.005 * first))
+    assert out["fin_saturation"][0] == pytest.approx(100.0 * full / (2.0 * lasting), abs=100.0 * 0.1 / (2.0 * lasting))
 
 
 def test_a_craft_that_cannot_be_steered_is_told_so(unstable):
