@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 
 import synthetic_craft as synthetic
-from towtank.errors import ArtefactError, InputError, TrialError
-from towtank.trials.circle import turning_circle
+from towtank.engine.plan import Clock, Ended, Gauge, Leg, Stat
+from towtank.engine.run import Ensemble, fly
+from towtank.engine.start import at
+from towtank.errors import ArtefactError, InputError
+from towtank.trials.circle import circle_ready, turning_circle
 from towtank.trials.files import read_trajectory, write_index, write_trajectory
-from towtank.trials.integrate import Leg, free_run
 from towtank.trials.mission import lawnmower
-from towtank.trials.pullout import pull_out
+from towtank.trials.pullout import pull_out, pull_out_ready
+from towtank.trials.ready import fly_ready, readings
 from towtank.trials.standard import standard_trials
 from towtank.trials.start import setting
 from towtank.trials.steps import depth_step, heading_step
 from towtank.trials.straight import straight_run
-from towtank.trials.zigzag import zigzag
+from towtank.trials.zigzag import zigzag, zigzag_ready
 
 
 @pytest.fixture(scope="module")
@@ -62,16 +65,18 @@ def test_a_rudder_without_effect_gives_a_status_not_an_endless_trial(craft):
     assert np.isnan(trial.indices["first_overshoot"][0])
 
 
-def test_a_nose_that_goes_over_ends_the_trial_early(craft):
+def test_a_nose_that_goes_over_is_flown_on():
     topheavy = synthetic.model(synthetic.SUBOFF, zg=-0.3)
     trial = straight_run(topheavy, disturbance=0.0)
     s = setting(topheavy, None, piloted=False)
     start = s.state.copy()
     start[4] = 0.05
-    helm = replace(s.helm, pilot=None)
-    flight = free_run(topheavy, start, [Leg("fall", helm, 300.0)], thrust=s.thrust, interval=0.5)
-    assert flight.status.startswith("ended early: pitch reached")
-    assert np.all(np.isfinite(flight.state))
+    pitch = Gauge("theta", absolute=True)
+    flights = fly(topheavy, at(start), [Leg("fall", s.orders(), 300.0)], thrust=s.thrust, gauges=[pitch])
+    assert flights.over(pitch, Stat.HIGH)[0] > np.radians(85.0)
+    assert flights.finished[0]
+    assert np.all(np.isfinite(flights.state))
+    assert np.linalg.norm(flights.state[0, 3:7]) == pytest.approx(1.0, abs=1e-6)
     assert np.all(np.isfinite(trial.position))
 
 
@@ -79,9 +84,85 @@ def test_a_motion_that_grows_without_bound_ends_the_trial_early(craft):
     # Resistance of the wrong sign: the speed runs away in finite time.
     wild = craft.with_values(Xuu=+400.0)
     s = setting(craft, None, piloted=False)
-    flight = free_run(wild, s.state, [Leg("run", replace(s.helm, pilot=None), 1000.0)], thrust=50.0, interval=0.5)
-    assert flight.status.startswith("ended early")
-    assert np.all(np.isfinite(flight.state))
+    flights = fly(wild, at(s.state), [Leg("run", s.orders(), 1000.0)], thrust=50.0)
+    assert flights.ended[0] in (Ended.TOO_FAST, Ended.NOT_FINITE)
+    assert flights.end_time[0] < 1000.0
+    assert np.all(np.isfinite(flights.state))
+    trial = turning_circle(wild, "5 deg", hold_depth=False)
+    assert trial.status.startswith("ended early: the ")
+    assert np.isnan(trial.indices["yaw_rate"][0])
+    assert np.all(np.isfinite(trial.position))
+
+
+def test_a_circle_that_does_not_go_round_says_how_far_it_got(craft):
+    weak = synthetic.model({**synthetic.STABLE, "Nuudr": -2e-5, "Yuudr": 5e-5})
+    trial = turning_circle(weak, "5 deg", hold_depth=False)
+    assert "540 deg wanted" in trial.status
+    assert np.isnan(trial.indices["time_to_360"][0])
+    assert trial.indices["duration"][0] == pytest.approx(240.0 * 8.15, rel=1e-9)
+    assert abs(trial.indices["yaw_rate"][0]) > 0.0
+
+
+SHORT = {
+    "circle": lambda m: turning_circle(m, "25 deg", "3 m/s"),
+    "zigzag": lambda m: zigzag(m, "20 deg", "5 deg", "3 m/s"),
+    "vertical zigzag": lambda m: zigzag(m, "10 deg", "2 deg", "3 m/s", plane="vertical"),
+    "pull-out": lambda m: pull_out(m, "20 deg", "3 m/s"),
+    "straight run": lambda m: straight_run(m, "3 m/s", lengths=5.0),
+}
+
+
+@pytest.mark.parametrize("kind", SHORT)
+def test_the_compiled_loop_and_the_one_on_numpy_give_the_same_numbers(kind, monkeypatch):
+    model = synthetic.model(synthetic.STABLE)
+    usual = SHORT[kind](model)
+    monkeypatch.setenv("TOWTANK_ENGINE", "numpy")
+    plain = SHORT[kind](model)
+    assert plain.provenance["engine"]["path"] == "numpy"
+    assert plain.status == usual.status == "done"
+    assert plain.indices.keys() == usual.indices.keys()
+    for name, (value, unit) in usual.indices.items():
+        # The path off a growing motion adds to round-off; 1e-9 leaves room for libraries of other machines.
+        assert plain.indices[name] == (pytest.approx(value, rel=1e-9, abs=1e-9, nan_ok=True), unit), name
+
+
+@pytest.mark.parametrize(
+    "ready",
+    [
+        lambda m: circle_ready(m, "20 deg"),
+        lambda m: zigzag_ready(m, "20 deg", "5 deg"),
+        lambda m: zigzag_ready(m, "10 deg", "2 deg", plane="vertical"),
+        lambda m: pull_out_ready(m, "20 deg"),
+    ],
+)
+def test_many_craft_are_read_as_each_one_alone(ready):
+    model = synthetic.model(synthetic.STABLE)
+    trial = ready(model)
+    # The last craft hardly answers its rudder: where it does not get, its numbers are not there.
+    drawn = {n: model.derivatives[n] * np.array([1.0, 0.8, 0.01]) for n in ("Nuudr", "Muude", "Yuudr", "Zuude")}
+    many = readings(model, trial, fly_ready(model, trial, Ensemble(3, drawn)))
+    for i in range(3):
+        one = model.with_values(**{name: float(values[i]) for name, values in drawn.items()})
+        alone = readings(one, trial, fly_ready(one, trial))
+        for name, (values, _) in alone.items():
+            assert values.shape == (1,)
+            # Packs have sines and cosines of their own, which differ from the C library's in the last digits.
+            assert many[name][0][i] == pytest.approx(values[0], rel=1e-6, abs=1e-9, nan_ok=True), (name, i)
+
+
+def test_the_marks_of_a_zigzag_are_its_indices(craft):
+    trial = zigzag(craft, "20 deg", "20 deg")
+    marks = {m["leg"]: m["time"] for m in trial.provenance["marks"]}
+    heading = np.degrees(np.interp([marks[f"swing {i}"] for i in (1, 2, 3, 4)], trial.time, trial.attitude[:, 2]))
+    # The record is a straight line between samples 0.4 s apart; the end of the last leg lies beyond its last sample.
+    assert heading == pytest.approx([-20.0, 20.0, -20.0, 20.0], abs=0.01)
+    assert trial.indices["initial_turning_time"][0] == marks["swing 1"]
+    assert trial.indices["reach"][0] == marks["back 2"]
+    assert trial.indices["period"][0] == marks["swing 4"] - marks["swing 2"]
+    swung = (trial.time > marks["swing 1"]) & (trial.time < marks["back 2"])
+    far = int(np.argmin(np.where(swung, trial.attitude[:, 2], np.inf)))
+    assert trial.indices["first_overshoot"][0] == pytest.approx(-np.degrees(trial.attitude[far, 2]) - 20.0, abs=0.01)
+    assert trial.indices["time_to_check_first"][0] == pytest.approx(trial.time[far] - marks["swing 1"], abs=0.4)
 
 
 def test_a_heavy_craft_sinks_in_open_loop_and_says_how_far():
@@ -127,8 +208,8 @@ def test_bad_input_is_refused_with_the_reason(craft, call, words):
 
 def test_a_start_that_is_not_finite_is_refused(craft):
     s = setting(craft, None, piloted=False)
-    with pytest.raises(TrialError, match="finite"):
-        free_run(craft, s.state * np.nan, [Leg("run", s.helm, 1.0)], thrust=1.0, interval=0.1)
+    with pytest.raises(InputError, match="finite"):
+        fly(craft, at(s.state * np.nan), [Leg("run", s.orders(), 1.0)], thrust=1.0, clock=Clock(0.1))
 
 
 def test_trajectories_and_their_index_come_back_from_disk(craft, circle, tmp_path):
