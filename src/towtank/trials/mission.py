@@ -33,7 +33,8 @@ WIDEST = 12.0
 RUDDER_SHARE = 0.6
 """Share of the rudder range that the turns between legs are planned with."""
 PATIENCE = 3.0
-"""A leg, or a half of a long one, is given up after this multiple of the time it should take."""
+"""A leg is given up after this multiple of the time it should take. Coming onto a long leg may use all of it; the rest of
+the leg has its own share beside that."""
 SETTLED = 0.5
 """Share of a long leg after which the craft should have come onto it."""
 
@@ -158,7 +159,7 @@ def _pieces(
         level, half = length - early, SETTLED * length
         split = i % 2 == 1 and level > half
         if split:
-            onto = Leg(f"leg {i} coming on", orders, SETTLED * PATIENCE * expected, Until("along", half), required=True)
+            onto = Leg(f"leg {i} coming on", orders, PATIENCE * expected, Until("along", half), required=True)
             pieces.append(_Piece(onto, i, False))
         within = (1.0 - SETTLED if split else 1.0) * PATIENCE * expected
         pieces.append(_Piece(Leg(f"leg {i}", orders, within, Until("along", level), required=True), i, split))
