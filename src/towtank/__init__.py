@@ -31,6 +31,8 @@ _PUBLIC = {
     "depth_step": "towtank.trials.steps",
     "lawnmower": "towtank.trials.mission",
     "assess": "towtank.verdict.assess",
+    "monte_carlo": "towtank.montecarlo.study",
+    "Tolerances": "towtank.montecarlo.draw",
 }
 
 _STAGES = {"derive", "report"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from towtank.tank.tank import Tank
     from towtank.trials.trajectory import Trajectory
 
-STAGES = ("craft", "plan", "tow", "derive", "trials", "verdict", "report")
+STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "verdict", "report")
+DRAWING = {"samples": "500", "mass": "0", "cg": "0", "current": "0", "seed": "20"}
+"""Monte Carlo study of a study that was asked for no other: the uncertainty of the derivatives alone."""
 
 
 def open_chain(reply: Reply, craft: str | None, out: Path | None, speed: str | None = None) -> Chain:
@@ -65,13 +67,17 @@ def _at_speed(craft: Craft, speed: str | None) -> Craft:
 
 @dataclass
 class Chain:
-    """One study under way. ``speed`` as the user wrote it; None is the craft's own."""
+    """One study under way. ``speed`` as the user wrote it; None is the craft's own.
+
+    drawing : what the user asked of the Monte Carlo study, as in ``DRAWING``; None is what the study has, or that.
+    """
 
     study: Study
     craft: Craft
     source: str
     reply: Reply
     speed: str | None = None
+    drawing: dict[str, str] | None = None
     wall: dict[str, float] = field(default_factory=dict)
     _runs: tuple[Run, ...] | None = None
     _told: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -104,9 +110,14 @@ class Chain:
                 return craft | {"runs": files.get("tow", "")}
             case "trials":
                 return craft | {"derivatives": file_hash(study.derivatives)}
+            case "mc":
+                return craft | {"derivatives": file_hash(study.derivatives)} | self.asked()
             case "verdict":
-                return craft | {"derivatives": file_hash(study.derivatives), "trials": files.get("trials", "")}
-        known = ("plan", "tow", "derive", "trials", "verdict")
+                # The index of the trials holds what the verdict does not use: the spread of the indices.
+                flown = self.study.stages().get("trials", {}).get("files", {})
+                flown = {name: known for name, known in flown.items() if name.endswith(".nc")}
+                return craft | {"derivatives": file_hash(study.derivatives), "trials": digest(flown, 16)}
+        known = ("plan", "tow", "derive", "trials", "mc", "verdict")
         return craft | {name: files.get(name, "") for name in known}
 
     def done(self, stage: str) -> bool:
@@ -275,7 +286,7 @@ class Chain:
 
         names = {item.name for item in trajectories}
         everything = (*trajectories, *(item for item in self.trajectories() if item.name not in names))
-        index = write_index(everything, self.study.trials)
+        index = write_index(everything, self.study.trials, self._spread(everything))
         return [index, *(self.study.trials / f"{item.name}.nc" for item in everything)]
 
     def trajectories(self) -> tuple[Trajectory, ...]:
@@ -283,6 +294,52 @@ class Chain:
         from towtank.trials.files import read_trajectory
 
         return tuple(read_trajectory(path) for path in sorted(self.study.trials.glob("*.nc")))
+
+    def asked(self) -> dict[str, str]:
+        """What is asked of the Monte Carlo study: by the user now, by the record of the study, or ``DRAWING``."""
+        known = self.study.stages().get("mc", {}).get("inputs", {})
+        return self.drawing or {name: known.get(name, usual) for name, usual in DRAWING.items()}
+
+    def scatter(self, where: str | None = None, workers: int = 1, settings: Mapping[str, Any] | None = None) -> None:
+        """The trials of craft drawn from the uncertainty of the derivatives; see ``towtank.montecarlo``.
+
+        A study of more samples that is out of date is done again with the usual number, unless it is asked for now.
+        """
+        if self.drawing is None and not self.done("mc"):
+            samples = min(int(self.asked()["samples"]), int(DRAWING["samples"]))
+            self.drawing = self.asked() | {"samples": str(samples)}
+        self._do("mc", lambda: self._scatter(where, workers, settings or {}))
+        self.reply.file("mc", self.study.mc)
+
+    def _scatter(self, where: str | None, workers: int, settings: Mapping[str, Any]) -> Sequence[Path]:
+        from towtank.montecarlo.draw import tolerances
+        from towtank.montecarlo.files import FOLDER, write_mc, write_std
+        from towtank.montecarlo.study import monte_carlo
+
+        asked, pieces = self.asked(), self.study.root / FOLDER / "pieces"
+        self.reply.kept = f"Finished pieces are kept in {pieces}."
+        found = monte_carlo(
+            self.model(), int(asked["samples"]), given=tolerances(asked["mass"], asked["cg"], asked["current"]),
+            seed=int(asked["seed"]), progress=self.reply.progress, ledger=pieces, where=where, workers=workers,
+            settings=settings, program=program_hash(),
+        )  # fmt: skip
+        files = write_mc(found, self.study.root)
+        if self.done("trials"):
+            record = self.study.stages()["trials"]
+            write_std(found, self.study.trials)
+            kept = [self.study.root / name for name in record["files"]]
+            self.study.record("trials", record["inputs"], kept, record["wall_s"], record["summary"])
+        self.reply.kept = f"What is done is kept in {self.study.root}."
+        return files
+
+    def _spread(self, trajectories: Sequence[Trajectory]) -> dict[str, dict[str, float]] | None:
+        """Standard uncertainties of the indices, where the Monte Carlo study is up to date."""
+        from towtank.montecarlo.files import read_mc, std_of
+
+        if not self.done("mc"):
+            return None
+        values = {t.name: {name: value for name, (value, _) in t.indices.items()} for t in trajectories}
+        return std_of(read_mc(self.study.root), values)
 
     def judge(self) -> None:
         """The verdict."""

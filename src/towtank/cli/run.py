@@ -21,7 +21,7 @@ def run(
 ) -> None:
     """Do the whole chain, from craft file to report.
 
-    Captive tests, derivatives, model, trials, verdict and report go into the study folder.
+    Captive tests, derivatives, model, trials with their uncertainty, verdict and report go into the study folder.
     Stages that are done with the same inputs are not repeated; after Ctrl-C the same command resumes.
 
     Example: towtank run hokie
@@ -40,6 +40,7 @@ def run(
         chain.tow()
         chain.derive()
         chain.try_out()
+        chain.scatter()
         chain.judge()
         chain.publish()
         verdict = chain.verdict()

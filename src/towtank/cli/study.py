@@ -74,6 +74,11 @@ class Study:
         return self.root / "trials"
 
     @property
+    def mc(self) -> Path:
+        """The Monte Carlo study."""
+        return self.root / "mc.json"
+
+    @property
     def verdict(self) -> Path:
         """The verdict."""
         return self.root / "verdict.json"

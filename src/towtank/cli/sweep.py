@@ -76,7 +76,7 @@ def sweep(
     with answering("sweep", json, debug) as reply:
         if not vary:
             raise InputError('nothing to vary. Name an axis and its values, such as --vary "fin_size=0.8:1.4:4".')
-        settings = _settings(cluster_settings, cluster)
+        settings = slurm_settings(cluster_settings, cluster)
         chain = open_chain(reply, craft, out, speed)
         asked = _asked(chain, vary, trials, members)
         if cluster is None and cores() > 1 and (workers or 2) > 1:
@@ -99,7 +99,8 @@ def _asked(chain: Chain, vary: list[str], trials: str | None, members: int) -> S
     )
 
 
-def _settings(path: Path | None, cluster: str | None) -> dict[str, Any]:
+def slurm_settings(path: Path | None, cluster: str | None) -> dict[str, Any]:
+    """Settings of the Slurm jobs from a TOML file."""
     import tomllib
 
     if path is None:

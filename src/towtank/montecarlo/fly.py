@@ -17,6 +17,7 @@ from towtank.engine.start import at
 from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.montecarlo.draw import CURRENT, Drawn, Tolerances, draw, starts
+from towtank.montecarlo.packed import packed, unpacked
 from towtank.montecarlo.stable import neutral, stability
 from towtank.progress import Progress, Silent
 from towtank.trials.ready import Ready, clock_of, fly_ready, readings
@@ -81,10 +82,10 @@ def hold(key: str, trials: Trials) -> tuple[tuple[Model, Ready], ...]:
 
 
 def fly_piece(study: Study, piece: Piece) -> dict[str, Any]:
-    """Numbers of one piece, as plain lists so that they can be kept in a file or sent; NaN is None.
+    """Numbers of one piece, in a form that JSON holds, so that they can be kept in a file or sent; arrays ``packed``.
 
-    "trials" : name -> {"kind", "loop", "indices": name -> {"unit", "values" (count)}, "ended" (count)};
-    "stability" : name -> (count). In the first piece the best estimate comes before the ``count`` craft, and "bands"
+    "trials" : name -> {"kind", "loop", "indices": name -> {"unit", "values" (count)}, "ended" (count)}, the last as in
+    ``Ended``; "stability" : name -> (count). In the first piece the best estimate comes before the ``count`` craft, and "bands"
     are stated: name -> as ``bands`` returns.
 
     Raises
@@ -93,7 +94,7 @@ def fly_piece(study: Study, piece: Piece) -> dict[str, Any]:
         The flights were stopped: nothing of the piece is kept.
     """
     drawn = draw(study.model, piece.count, study.given, study.seed, piece.number, study.root)
-    stable = {name: plain(values) for name, values in stability(study.model, drawn.columns).items()}
+    stable = {name: packed(values) for name, values in stability(study.model, drawn.columns).items()}
     out: dict[str, Any] = {"trials": {}, "stability": stable, "bands": {}}
     task = f"piece {piece.number + 1}"
     study.told.start(task, len(study.trials))
@@ -106,10 +107,10 @@ def fly_piece(study: Study, piece: Piece) -> dict[str, Any]:
             "loop": trial.loop,
             # A craft that ran away left the range of its derivatives: none of its numbers count.
             "indices": {
-                name: {"unit": unit, "values": plain(np.where(away, np.nan, values))}
+                name: {"unit": unit, "values": packed(np.where(away, np.nan, values))}
                 for name, (values, unit) in read.items()
             },
-            "ended": [Ended(int(code)).name.lower() for code in flights.ended],
+            "ended": packed(flights.ended, "f4"),
         }
         if piece.number == 0:
             out["bands"][trial.name] = bands(flights, away)
@@ -158,7 +159,7 @@ def bands(flights: Flights, away: NDArray[np.bool_]) -> dict[str, Any]:
     """Quantiles over the drawn craft at every sample, the best estimate being the first craft.
 
     "time" (S), "under_way" (S) share of the craft, "quantiles": channel -> (len(QUANTILES), S), "best": channel ->
-    (S), "tracks": "x", "y" -> (up to TRACKS, S). S ends where less than ``UNDER_WAY`` fly. Seven digits are kept.
+    (S), "tracks": "x", "y" -> (up to TRACKS, S). S ends where less than ``UNDER_WAY`` fly. In single precision.
     """
     log = np.where(away[:, None, None], np.nan, flights.log)
     flying = ~np.isnan(log[1:, :, 0])
@@ -167,11 +168,11 @@ def bands(flights: Flights, away: NDArray[np.bool_]) -> dict[str, Any]:
     at_ = slice(0, size, max(1, math.ceil(size / KEPT)))
     series = {name: log[:, at_, flights.logged.index(name)] for name in BAND_CHANNELS}
     return {
-        "time": short(flights.time[at_]),
-        "under_way": short(share[at_]),
-        "quantiles": {name: [short(row) for row in quantiles(values[1:])] for name, values in series.items()},
-        "best": {name: short(values[0]) for name, values in series.items()},
-        "tracks": {name: [short(row) for row in series[name][1 : TRACKS + 1]] for name in ("x", "y")},
+        "time": packed(flights.time[at_], "f4"),
+        "under_way": packed(share[at_], "f4"),
+        "quantiles": {name: packed(quantiles(values[1:]), "f4") for name, values in series.items()},
+        "best": {name: packed(values[0], "f4") for name, values in series.items()},
+        "tracks": {name: packed(series[name][1 : TRACKS + 1], "f4") for name in ("x", "y")},
     }
 
 
@@ -197,21 +198,6 @@ def pieces(samples: int, size: int) -> Sequence[Piece]:
     return [Piece(i, min(size, samples - first)) for i, first in enumerate(range(0, samples, size))]
 
 
-def plain(values: Array) -> list[float | None]:
-    """Numbers as JSON holds them."""
-    return [value if math.isfinite(value) else None for value in np.asarray(values, dtype=float).tolist()]
-
-
-def short(values: Array) -> list[float | None]:
-    """As ``plain``, with seven significant digits: enough to draw."""
-    return [float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist()]
-
-
-def numbers(values: Sequence[float | None]) -> Array:
-    """Array of what ``plain`` or ``short`` wrote."""
-    return np.array([math.nan if value is None else value for value in values], dtype=float)
-
-
 def gathered(answers: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
     """Pieces by number as one, in order: arrays end to end (N,), reasons as lists, bands of the first piece."""
     ordered = [answers[i] for i in sorted(answers)]
@@ -220,12 +206,12 @@ def gathered(answers: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
     for name, trial in first["trials"].items():
         parts = [answer["trials"][name] for answer in ordered]
         values = {
-            key: (np.concatenate([numbers(part["indices"][key]["values"]) for part in parts]), entry["unit"])
+            key: (np.concatenate([unpacked(part["indices"][key]["values"]) for part in parts]), entry["unit"])
             for key, entry in trial["indices"].items()
         }
-        ended = [reason for part in parts for reason in part["ended"]]
+        ended = [Ended(int(code)).name.lower() for part in parts for code in unpacked(part["ended"])]
         trials[name] = {"kind": trial["kind"], "loop": trial["loop"], "indices": values, "ended": ended}
     stable = {
-        key: np.concatenate([numbers(answer["stability"][key]) for answer in ordered]) for key in first["stability"]
+        key: np.concatenate([unpacked(answer["stability"][key]) for answer in ordered]) for key in first["stability"]
     }
     return {"trials": trials, "stability": stable, "bands": first["bands"]}

@@ -23,6 +23,8 @@ RANKED = 5000
 """Craft the rank correlations rest on; more change them by less than 0.015."""
 TIED = 0.999
 """Rank correlation beyond which two parameters are one."""
+ROUND_OFF = 1e-9
+"""Range of an index below which its order is that of round-off."""
 LEADING = 3
 """Derivatives named for each index."""
 
@@ -111,7 +113,7 @@ class Ranks:
         kept = values[: self._values.shape[1]]
         there = np.isfinite(kept)
         count = int(np.count_nonzero(there))
-        if count < 10 or not self.names or float(np.ptp(kept[there])) == 0.0:
+        if count < 10 or not self.names or float(np.ptp(kept[there])) <= ROUND_OFF:
             return ()
         mark = there.tobytes()
         if mark not in self._known:

@@ -21,9 +21,9 @@ from towtank.montecarlo.fly import (
     fly_piece,
     gathered,
     hold,
-    numbers,
     pieces,
 )
+from towtank.montecarlo.packed import unpacked
 from towtank.montecarlo.result import Bands, MonteCarlo, PlaneSpread, TrialSpread
 from towtank.montecarlo.spread import RANKED, Ranks, Spread, spread_of, wilson
 from towtank.montecarlo.stable import PLANES
@@ -154,7 +154,7 @@ def _on_file(
 
     if study.model.extra is not None:
         raise InputError(
-            f"Monte Carlo with the extra load {study.model.extra.name!r}: the text of a Python function is no part of a "
+            f"Monte Carlo with the extra load {study.model.extra.name!r}: the text of a function is no part of a "
             "piece's name, so results on file could be those of another one. Leave out the ledger."
         )
     keys = [f"{study.model.craft.name[:60]}-{digest([study.key, part], 16)}" for part in parts]
@@ -233,10 +233,7 @@ def _plane(plane: str, stable: Mapping[str, Array], ranks: Ranks) -> PlaneSpread
 
 
 def _bands(entry: Mapping[str, Any]) -> Bands:
-    return Bands(
-        time=numbers(entry["time"]),
-        quantiles={name: np.array([numbers(row) for row in rows]) for name, rows in entry["quantiles"].items()},
-        best={name: numbers(row) for name, row in entry["best"].items()},
-        under_way=numbers(entry["under_way"]),
-        tracks={name: np.array([numbers(row) for row in rows]) for name, rows in entry["tracks"].items()},
-    )
+    many = {
+        part: {name: unpacked(rows) for name, rows in entry[part].items()} for part in ("quantiles", "best", "tracks")
+    }
+    return Bands(time=unpacked(entry["time"]), under_way=unpacked(entry["under_way"]), **many)
