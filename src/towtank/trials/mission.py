@@ -33,8 +33,8 @@ WIDEST = 12.0
 RUDDER_SHARE = 0.6
 """Share of the rudder range that the turns between legs are planned with."""
 PATIENCE = 3.0
-"""A leg is given up after this multiple of the time it should take. Coming onto a long leg may use all of it; the rest of
-the leg has its own share beside that."""
+"""A leg is given up after this multiple of the time it should take. Coming onto a long leg may use all of it; the
+rest of the leg has its own share beside that."""
 SETTLED = 0.5
 """Share of a long leg after which the craft should have come onto it."""
 
