@@ -12,7 +12,10 @@ import report_synthetic as case
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+import synthetic_craft as synthetic
 from towtank.figures import coefficients, forces, histories, paper, poles, series, shape, tracks
+from towtank.trials.circle import turning_circle
+from towtank.trials.zigzag import zigzag
 
 approx = pytest.approx
 SWEEP = poles.PoleSweep(
@@ -171,6 +174,17 @@ def test_overshoot_is_the_swing_beyond_the_switch():
     sense = np.sign(angle[switch[0]])
     expected = sense * (inside[np.argmax(sense * inside)] - angle[switch[0]])
     assert f"{expected:.1f}°" in words(histories.zigzag(trial))
+
+
+def test_the_numbers_on_the_figures_of_a_trial_are_its_indices():
+    craft = synthetic.model(synthetic.STABLE)
+    swing, circle = zigzag(craft, "20 deg", "20 deg"), turning_circle(craft, "20 deg")
+    drawn = words(histories.zigzag(swing))
+    for name in ("first_overshoot", "second_overshoot"):
+        assert f"{swing.indices[name][0]:.1f}°" in drawn
+    drawn = words(tracks.turning_circle(circle))
+    for name in ("advance", "transfer", "tactical_diameter"):
+        assert f"{name.replace('_', ' ')} {circle.indices[name][0]:.1f} m" in drawn
 
 
 def test_bars_keep_fit_and_model_form_apart():

@@ -36,7 +36,7 @@ def zigzag(trial: Trajectory, ax: Axes | None = None) -> Axes:
     for begin, end in pairwise(switch):
         sense = np.sign(angle[begin]) or 1.0
         top = begin + int(np.argmax(sense * angle[begin:end]))
-        over = abs(angle[top]) - abs(angle[begin])
+        over = abs(angle[top]) - abs(_at_switch(trial, angle, int(begin)))
         ax.plot(trial.time[top], angle[top], "v" if sense > 0 else "^", color=INK, markersize=4)
         note(ax, f"{over:.1f}°", (trial.time[top], angle[top]), (0, 5 if sense > 0 else -11), ha="center")
     frame(ax, "time [s]", "angle [deg]")
@@ -44,6 +44,13 @@ def zigzag(trial: Trajectory, ax: Axes | None = None) -> Axes:
     head(ax, f"Zigzag, {trial.name}", trial.level, NO_BAND + "; marked: swing beyond the switch")
     legend(ax, ncol=2, loc="upper right")
     return ax
+
+
+def _at_switch(trial: Trajectory, angle: Array, first: int) -> float:
+    """Angle [deg] at the switch before sample ``first``: at the trial's mark, or in the sample where it has none."""
+    marks = (float(mark["time"]) for mark in trial.provenance.get("marks", ()))
+    time = next((t for t in marks if trial.time[first - 1] <= t <= trial.time[first]), float(trial.time[first]))
+    return float(np.interp(time, trial.time, angle))
 
 
 def _holds(command: Array) -> list[tuple[int, int]]:

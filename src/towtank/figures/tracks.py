@@ -84,7 +84,8 @@ def turning_circle(trial: Trajectory, ax: Axes | None = None) -> Axes:
         past = np.flatnonzero(turned >= np.radians(angle))
         if not len(past):
             continue
-        x, y = float(aside[past[0]]), float(ahead[past[0]])
+        around = slice(max(int(past[0]) - 1, 0), int(past[0]) + 1)
+        x, y = (float(np.interp(np.radians(angle), turned[around], values[around])) for values in (aside, ahead))
         ax.plot(x, y, "s", color=colour, markersize=4)
         if angle < 100.0:
             ax.plot([x, x, 0.0], [0.0, y, y], ":", color=colour, linewidth=0.9)
