@@ -32,6 +32,8 @@ def stable():
 
 @pytest.mark.parametrize("kind", SHORT)
 def test_the_compiled_loop_and_the_one_on_numpy_give_the_same_numbers(stable, kind, monkeypatch):
+    monkeypatch.setattr("towtank.trials.spiral.FIRST", 2.0)  # lengths; a whole spiral takes numpy 6 s
+    monkeypatch.setattr("towtank.trials.spiral.EACH", 1.0)
     usual = SHORT[kind](stable)
     monkeypatch.setenv("TOWTANK_ENGINE", "numpy")
     plain = SHORT[kind](stable)
