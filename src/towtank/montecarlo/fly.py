@@ -85,8 +85,8 @@ def fly_piece(study: Study, piece: Piece) -> dict[str, Any]:
     """Numbers of one piece, in a form that JSON holds, so that they can be kept in a file or sent; arrays ``packed``.
 
     "trials" : name -> {"kind", "loop", "indices": name -> {"unit", "values" (count)}, "ended" (count)}, the last as in
-    ``Ended``; "stability" : name -> (count). In the first piece the best estimate comes before the ``count`` craft, and "bands"
-    are stated: name -> as ``bands`` returns.
+    ``Ended``; "stability" : name -> (count). In the first piece the best estimate comes before the ``count``
+    craft, and "bands" are stated: name -> as ``bands`` returns.
 
     Raises
     ------

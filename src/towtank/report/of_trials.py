@@ -112,7 +112,7 @@ def _indices(it: Sequence[Trajectory], index: Mapping[str, Any], common: Sequenc
             rows.append((trial.name, name.replace("_", " "), mean, spread, unit))
     level = " + ".join(dict.fromkeys(t.level for t in it))
     words = (
-        "std from the uncertainty of the derivatives; - where it was not computed"
+        "std from the Monte Carlo study; - where less than half of its craft have the index"
         if some
         else "not computed for these trials"
     )

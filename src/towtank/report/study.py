@@ -19,6 +19,7 @@ from towtank.trials.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from towtank.model.equations import Model
+    from towtank.montecarlo.result import MonteCarlo
     from towtank.verdict.table import Verdict
 
 STAGES = {
@@ -27,6 +28,7 @@ STAGES = {
     "runs": "Pass the runs, or run `towtank tow`.",
     "derivatives": "Pass the Derivatives, or run `towtank derive`.",
     "trials": "Pass trajectories, or run `towtank trial`.",
+    "mc": "Pass the MonteCarlo, or run `towtank mc`.",
     "verdict": "Pass the Verdict, or run `towtank assess`.",
     "grid": "The fast tank has no mesh; a mesh study belongs to CFD runs.",
     "validation": "Run `make validate`, which compares the fast tank with published tests.",
@@ -49,6 +51,7 @@ class Study:
     derivatives: Derivatives | None = None
     model: Model | None = None
     trajectories: tuple[Trajectory, ...] = ()
+    mc: MonteCarlo | None = None
     verdict: Verdict | None = None
     index: Mapping[str, Any] = field(default_factory=dict)
     grid: Mapping[str, Any] = field(default_factory=dict)
@@ -70,13 +73,14 @@ class Study:
         """Stages that left nothing."""
         held = {
             "craft": self.craft, "plan": self.plan, "runs": self.runs, "derivatives": self.derivatives,
-            "trials": self.trajectories, "verdict": self.verdict, "grid": self.grid, "validation": self.validation,
+            "trials": self.trajectories, "mc": self.mc, "verdict": self.verdict, "grid": self.grid,
+            "validation": self.validation,
         }  # fmt: skip
         return tuple(stage for stage, content in held.items() if not content)
 
 
 def gather(things: Iterable[Any]) -> Study:
-    """Sort ``things`` into a Study: Craft, Plan, Run, Derivatives, Model, Trajectory, Verdict, or sequences of them.
+    """Sort ``things`` into a Study: nouns such as Craft, Run, Model, MonteCarlo, or sequences of them.
 
     Raises
     ------
@@ -153,13 +157,15 @@ def _part(thing: Any) -> str:
         if isinstance(thing, kind):
             return name
     from towtank.model.equations import Model
+    from towtank.montecarlo.result import MonteCarlo
     from towtank.verdict.table import Verdict
 
-    if isinstance(thing, Model | Verdict):
-        return "model" if isinstance(thing, Model) else "verdict"
+    for of, name in ((Model, "model"), (MonteCarlo, "mc"), (Verdict, "verdict")):
+        if isinstance(thing, of):
+            return name
     raise InputError(
         f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, Derivatives, Model, Trajectory, "
-        "Verdict, or sequences of them."
+        "MonteCarlo, Verdict, or sequences of them."
     )
 
 
@@ -193,6 +199,7 @@ def read_study(folder: Path | str) -> Study:
 
     from towtank.craft.library import read_craft
     from towtank.derive.files import read_derivatives
+    from towtank.montecarlo.files import read_mc
     from towtank.plan.files import read_plan
     from towtank.verdict.files import read_verdict
 
@@ -207,6 +214,7 @@ def read_study(folder: Path | str) -> Study:
             "derivatives", files["derivatives.json"], lambda: read_derivatives(files["derivatives.json"])
         ),
         trajectories=attempt("trials", files["trials"], lambda: _trajectories(files["trials"]), ()),
+        mc=attempt("mc", root / "mc.json", lambda: read_mc(root)),
         verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
         index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
         grid=attempt("grid", root / "grid.json", lambda: read_json(root / "grid.json", "towtank/grid/1"), {}),
