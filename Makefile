@@ -1,7 +1,7 @@
 # make run      set up, then the whole chain for the library craft "hokie"
 # make test     set up, then lint, types, layers and tests
 # make help     the other targets
-# Needs python3 (3.11 or newer), gcc and make. Everything is installed into .venv/.
+# Needs python3 (3.11 or newer), gcc and make. Everything is installed into .venv/; the engine is compiled on the way.
 
 PYTHON ?= python3
 VENV   := .venv
@@ -9,21 +9,22 @@ BIN    := $(VENV)/bin
 JOBS   ?= $(shell nproc 2>/dev/null || echo 2)
 OUT    ?= hokie
 
-.PHONY: help install run test lint bench validate clean
+.PHONY: help install run test lint bench bench-engine validate clean
 .DEFAULT_GOAL := help
 
 help:
-	@echo "make install   the package into $(VENV)/; the command is $(BIN)/towtank"
+	@echo "make install   the package into $(VENV)/, its engine compiled; the command is $(BIN)/towtank"
 	@echo "make run       towtank run hokie, results in ./$(OUT)"
 	@echo "make test      ruff, mypy, import-linter, pytest"
 	@echo "make lint      the first three of these"
 	@echo "make validate  the longer checks; rewrites the validation table of the report"
 	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
+	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
 	@echo "make clean     remove $(VENV)/, caches and bench/"
 
 install: $(VENV)/.installed
 
-$(VENV)/.installed: pyproject.toml .ci/venv.sh
+$(VENV)/.installed: pyproject.toml hatch_build.py .ci/venv.sh
 	bash .ci/venv.sh "$(PYTHON)" "$(VENV)"
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install --quiet --editable .
@@ -52,6 +53,9 @@ validate: $(VENV)/.tools
 bench: $(VENV)/.installed
 	$(BIN)/python benchmarks/bench.py
 
+bench-engine: $(VENV)/.tools
+	$(BIN)/python benchmarks/engine.py
+
 clean:
-	rm -rf $(VENV) bench build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) bench build dist src/towtank/engine/lib .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

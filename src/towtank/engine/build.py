@@ -10,9 +10,8 @@ import hashlib
 import os
 import platform
 import shutil
-import subprocess
-import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,13 +23,18 @@ C_SOURCES = Path(__file__).resolve().parent / "c"
 SHIPPED_LIBRARIES = Path(__file__).resolve().parent / "lib"
 """Libraries compiled at install."""
 
-_TEXTS = ("model/*.py", "pilot/law.py", "pilot/orders.py", "pilot/allocation.py", "pilot/guidance.py", "symbols.py",
-          "engine/form.py", "engine/loop.py", "engine/trace.py", "engine/emit.py", "engine/build.py", "engine/c/*")  # fmt: skip
+_TEXTS = (
+    "model/*.py", "pilot/law.py", "pilot/orders.py", "pilot/allocation.py", "pilot/guidance.py", "symbols.py",
+    "engine/form.py", "engine/loop.py", "engine/trace.py", "engine/emit.py", "engine/build.py", "engine/c/*.[ch]",
+)  # fmt: skip
 """What a library depends on, below the package's folder."""
 
 _FLAGS = ("-O2", "-ftree-vectorize", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-Wno-psabi",
           "-std=gnu11", "-fPIC", "-fvisibility=hidden")  # fmt: skip
 """No -ffast-math and no -ffinite-math-only: a state that is not finite must be seen."""
+
+KEPT = 64
+"""Libraries kept in the cache; the ones not used for longest go first."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ class Target:
     needs: frozenset[str] = frozenset()
 
 
-_V3 = frozenset("avx avx2 bmi1 bmi2 f16c fma movbe".split())
-_V4 = _V3 | frozenset("avx512f avx512bw avx512cd avx512dq avx512vl".split())
+_V3 = frozenset(("avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"))
+_V4 = _V3 | frozenset(("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"))
 X86 = (
     Target("avx512", 8, ("-march=x86-64-v4", "-mprefer-vector-width=512", "-ffp-contract=fast"), _V4),
     Target("avx2", 4, ("-march=x86-64-v3", "-ffp-contract=fast"), _V3),
@@ -52,6 +56,15 @@ X86 = (
 )
 """Best first. Eight lanes on AVX2 lose a quarter to spills (ENGINE notes)."""
 OTHER = (Target("generic", 2),)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One library to be compiled: file name -> C text of a form, the target, the file that appears."""
+
+    texts: dict[str, str]
+    target: Target
+    out: Path
 
 
 def targets() -> tuple[Target, ...]:
@@ -69,14 +82,15 @@ def source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def library_name(form: Form, target: Target) -> str:
-    """File name of the library of a form without an extra load."""
-    return f"{form.word}.{target.name}.{source_hash()}.so"
+def library_name(form: Form, target: Target, text: str = "") -> str:
+    """File name of the library of a form. ``text``: the C text, where the sources do not decide it (an extra load)."""
+    key = hashlib.sha256((source_hash() + text).encode()).hexdigest()[:16] if text else source_hash()
+    return f"{form.word}.{target.name}.{key}.so"
 
 
 def cache_folder() -> Path:
     """Where libraries compiled on demand lie."""
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path("~").expanduser() / ".cache")
     return Path(home) / "towtank" / "engine"
 
 
@@ -100,52 +114,126 @@ def compile_library(texts: dict[str, str], target: Target, out: Path) -> Path:
     Raises
     ------
     TowtankError
-        No compiler, or it fails.
+        No compiler, it fails, or ``out`` cannot be written.
     """
+    error = compile_all([Job(texts, target, out)])[0]
+    if error:
+        raise TowtankError(error)
+    return out
+
+
+def compile_all(jobs: Sequence[Job]) -> list[str]:
+    """Compile every job, sharing the cores. Returns for each what went wrong, "" for nothing.
+
+    Raises
+    ------
+    TowtankError
+        No compiler, or no temporary folder.
+    """
+    import tempfile
+    from concurrent.futures import ThreadPoolExecutor
+
+    from towtank.parallel import cores
+
     cc = compiler()
     if cc is None:
         raise TowtankError(
             "engine: no C compiler (cc, gcc or clang) was found. Install one, or set CC; without it everything runs on "
             "numpy, slower."
         )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=out.parent) as folder:
-        work = Path(folder)
-        for name, text in texts.items():
-            (work / name).write_text(text)
-        flags = [cc, *_FLAGS, *target.flags, f"-I{work}", f"-I{C_SOURCES}"]
-        objects, running = [], []
-        for source, suffix, lanes in (("loop", "one", 1), ("loop", "pack", target.lanes), ("slopes", "one", 1)):
-            made = work / f"{source}_{suffix}.o"
-            macros = [f"-DLANES={lanes}", f"-DWIDE={target.lanes}", f"-DNAME(x)=x##_{suffix}"]
-            command = [*flags, *macros, "-c", str(C_SOURCES / f"{source}.c"), "-o", str(made)]
-            running.append((command, subprocess.Popen(command, stderr=subprocess.PIPE, text=True)))
-            objects.append(str(made))
-        for command, process in running:
-            _checked(command, process)
-        linked = work / "library.so"
-        link = [cc, "-shared", *objects, "-lm", "-o", str(linked)]
-        _checked(link, subprocess.Popen(link, stderr=subprocess.PIPE, text=True))
-        linked.replace(out)
-    return out
+    with ExitStack() as stack, ThreadPoolExecutor(cores()) as pool:
+        try:
+            folders = [Path(stack.enter_context(tempfile.TemporaryDirectory())) for _ in jobs]
+        except OSError as error:
+            raise TowtankError(f"engine: no temporary folder to compile in ({error}). Set TMPDIR to one.") from error
+        parts = [
+            [pool.submit(_failure, command) for command in _commands(cc, job, work)]
+            for job, work in zip(jobs, folders, strict=True)
+        ]
+        errors = ["".join(part.result() for part in some) for some in parts]
+        return [
+            error or _linked(cc, work, job.out) for error, work, job in zip(errors, folders, jobs, strict=True)
+        ]  # fmt: skip
 
 
-def _checked(command: list[str], process: subprocess.Popen[str]) -> None:
-    error = process.communicate()[1]
-    if process.returncode:
-        raise TowtankError(
-            f"engine: the C compiler failed ({' '.join(command[:1])}, status {process.returncode}): "
-            f"{error.strip()[-2000:]}. Without a library everything runs on numpy, slower."
+def _commands(cc: str, job: Job, work: Path) -> list[list[str]]:
+    """Write the texts of ``job`` into ``work``; the commands that make its objects there."""
+    for name, text in job.texts.items():
+        (work / name).write_text(text, "utf-8")
+    wide = job.target.lanes
+    return [
+        [cc, *_FLAGS, *job.target.flags, f"-I{work}", f"-I{C_SOURCES}", f"-DLANES={lanes}", f"-DWIDE={wide}",
+         f"-DNAME(x)=x##_{suffix}", "-c", str(C_SOURCES / f"{source}.c"), "-o", str(work / f"{source}_{suffix}.o")]
+        for source, suffix, lanes in (("slopes", "one", 1), ("loop", "pack", wide), ("loop", "one", 1))
+    ]  # fmt: skip
+
+
+def _linked(cc: str, work: Path, out: Path) -> str:
+    """Link the objects in ``work`` into ``out``; what went wrong, "" for nothing."""
+    made = work / "library.so"
+    error = _failure([cc, "-shared", *map(str, sorted(work.glob("*.o"))), "-lm", "-o", str(made)])
+    if error:
+        return error
+    part = out.with_name(f".{out.name}.{os.getpid()}.part")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            file.write(made.read_bytes())
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(out)
+    except OSError as problem:
+        return (
+            f"engine: {out.parent} cannot be written ({problem.strerror or problem}). Set XDG_CACHE_HOME to a folder "
+            "that can, so that compiled libraries are kept."
         )
+    finally:
+        if part.exists():
+            part.unlink()
+    return ""
 
 
-def build(forms: Iterable[Form], folder: Path, only: Iterable[Target] | None = None) -> list[Path]:
-    """Compile ``forms`` for every target into ``folder``; libraries of older texts are removed."""
-    made = []
+def _failure(command: list[str]) -> str:
+    """Run ``command``; what went wrong, "" for nothing."""
+    import subprocess
+
+    try:
+        done = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False
+        )
+    except OSError as error:
+        return f"engine: the C compiler {command[0]} cannot be started ({error}). Set CC to one that works."
+    if not done.returncode:
+        return ""
+    words = done.stderr.decode(errors="replace").strip()[-2000:]
+    return f"engine: the C compiler {command[0]} failed (status {done.returncode}): {words or 'it said nothing'}."
+
+
+def build(forms: Iterable[Form], folder: Path, only: Iterable[Target] | None = None) -> tuple[list[Path], list[str]]:
+    """Compile ``forms`` for every target into ``folder``; libraries of older texts are removed.
+
+    Returns the libraries made and what went wrong with the others.
+    """
+    wanted = tuple(only or targets())
+    jobs = []
     for form in forms:
         texts = c_text(form)
-        made += [compile_library(texts, target, folder / library_name(form, target)) for target in only or targets()]
+        jobs += [Job(texts, target, folder / library_name(form, target)) for target in wanted]
+    errors = compile_all(jobs)
+    made = [job.out for job, error in zip(jobs, errors, strict=True) if not error]
     for old in folder.glob("*.so"):
         if old not in made:
             old.unlink()
-    return made
+    return made, [error for error in errors if error]
+
+
+def prune(folder: Path, keep: int = KEPT) -> None:
+    """Remove the libraries of ``folder`` beyond ``keep``, those not used for longest."""
+    used = []
+    for path in folder.glob("*.so"):
+        try:
+            used.append((path.stat().st_mtime, path))
+        except OSError:
+            continue  # another process removed it
+    for _, path in sorted(used, reverse=True)[keep:]:
+        path.unlink(missing_ok=True)

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import hashlib
 import os
-from dataclasses import dataclass
+import struct
+import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from towtank.engine.build import (
-    SHIPPED_LIBRARIES,
-    Target,
-    c_text,
-    cache_folder,
-    compile_library,
-    compiler,
-    library_name,
-    targets,
-)
+from towtank.engine import build
+from towtank.engine.build import Target, c_text, cache_folder, compile_library, compiler, library_name, targets
 from towtank.engine.form import Form
-from towtank.errors import InputError
+from towtank.errors import InputError, TowtankError
 
 CHOICE = "TOWTANK_ENGINE"
 """Environment variable: ``numpy``, or the name of a target, instead of the best this machine can run."""
@@ -54,6 +47,10 @@ class Slope(ctypes.Structure):
     )  # fmt: skip
 
 
+class EngineWarning(UserWarning):
+    """The compiled loop is not used although it was wanted; results are the same, later."""
+
+
 @dataclass(frozen=True)
 class Library:
     """A loaded library: the path it came from, its target, and the compiled functions."""
@@ -68,26 +65,51 @@ class Library:
         return int(function(ctypes.byref(task)))
 
 
+@dataclass(frozen=True)
+class Found:
+    """Where a form runs. ``origin``: shipped, cache, "" for numpy.   ``why``: why not compiled, and the remedy.
+
+    target : the one that is used, or would be when it is ``pending``, that is compiled at its first use.
+    """
+
+    library: Library | None = None
+    origin: str = ""
+    why: str = ""
+    target: Target | None = None
+    pending: bool = False
+
+
+def able() -> tuple[Target, ...]:
+    """Targets this machine can run, best first."""
+    flags = cpu_flags()
+    return tuple(target for target in targets() if target.needs <= flags)
+
+
 def wanted() -> tuple[Target, ...]:
     """Targets this machine can run, best first, or the one that the environment asks for; empty for numpy.
 
     Raises
     ------
     InputError
-        The environment names a target that does not exist.
+        The environment names a target that does not exist, or that this CPU cannot run.
     """
     choice = os.environ.get(CHOICE, "")
+    if not choice:
+        return able()
     if choice == "numpy":
         return ()
-    if choice:
-        named = tuple(target for target in targets() if target.name == choice)
-        if not named:
-            raise InputError(
-                f"{CHOICE}={choice}: choose numpy or one of {', '.join(t.name for t in targets())}, or unset it."
-            )
-        return named
-    flags = cpu_flags()
-    return tuple(target for target in targets() if target.needs <= flags)
+    named = tuple(target for target in targets() if target.name == choice)
+    if not named:
+        raise InputError(
+            f"{CHOICE}={choice}: choose numpy or one of {', '.join(t.name for t in targets())}, or unset it."
+        )
+    lacking = named[0].needs - cpu_flags()
+    if lacking:
+        raise InputError(
+            f"{CHOICE}={choice}: this CPU lacks {', '.join(sorted(lacking))}, so the program would be ended by the "
+            f"system. Choose numpy or one of {', '.join(t.name for t in able())}, or unset it."
+        )
+    return named
 
 
 @functools.cache
@@ -106,43 +128,162 @@ def library(form: Form) -> Library | None:
     """The library of ``form``: shipped, compiled before, or compiled now; None where only numpy is left.
 
     A form that is not shipped, or whose shipped library is of an older text, is compiled when CasADi and a C compiler
-    are there, and kept in the user's cache.
+    are there, and kept in the user's cache. What goes wrong on the way is warned of once.
     """
-    for target in wanted():
-        name = _name(form, target)
-        for folder in (SHIPPED_LIBRARIES, cache_folder()):
-            path = folder / name
-            if path.exists():
-                return _loaded(path, target)
-    able = wanted()
-    if able and can_compile():
-        return _loaded(compile_library(c_text(form), able[0], cache_folder() / _name(form, able[0])), able[0])
-    return None
+    return _kept(_nameless(form), wanted(), _surroundings()).library
+
+
+def find(form: Form) -> Found:
+    """Where ``form`` would run now, without compiling anything."""
+    return _search(_nameless(form), wanted())
 
 
 def can_compile() -> bool:
     """True where CasADi and a C compiler are there."""
+    return not _lacking()
+
+
+def _lacking() -> str:
+    """What compiling lacks, with the remedy; "" for nothing."""
+    if compiler() is None:
+        return "no C compiler (cc, gcc or clang) was found. Install one, or set CC to one"
+    return _no_casadi()
+
+
+def _no_casadi() -> str:
     from importlib.util import find_spec
 
-    return compiler() is not None and find_spec("casadi") is not None
+    return "" if find_spec("casadi") else "CasADi is not installed. Install it: pip install casadi"
 
 
-def _name(form: Form, target: Target) -> str:
+def _surroundings() -> tuple[str, ...]:
+    """What a search depends on beside the form and the targets."""
+    names = ("CC", "PATH", "XDG_CACHE_HOME", "HOME")
+    return (str(build.SHIPPED_LIBRARIES), *(os.environ.get(name, "") for name in names))
+
+
+def _nameless(form: Form) -> Form:
+    """The form without the numbers of its extra load, which are parameters: one text serves them all."""
     if form.extra is None:
-        return library_name(form, target)
-    if not can_compile():
-        return ""
-    text = hashlib.sha256(_extra_text(form).encode()).hexdigest()[:16]
-    return f"{form.word}.{target.name}.{text}.so"
+        return form
+    return replace(form, extra=form.extra.with_values(dict.fromkeys(form.extra.values, 0.0)))
 
 
 @functools.cache
-def _extra_text(form: Form) -> str:
-    return "".join(c_text(form).values())
+def _kept(form: Form, able: tuple[Target, ...], surroundings: tuple[str, ...]) -> Found:
+    """``_search`` once per process and surroundings; compiles what is pending and warns of what went wrong."""
+    found = _search(form, able)
+    if found.pending:
+        found = replace(done := _compiled(form, able), why=done.why or found.why)
+    if found.why and able:
+        instead = (
+            f"{form.word} runs on {found.library.target.name} instead ({found.origin})."
+            if found.library
+            else f"{form.word} runs on numpy, some hundred times slower, with the same results; "
+            f"{CHOICE}=numpy chooses that without a warning."
+        )
+        warnings.warn(f"engine: {found.why}. {instead}", EngineWarning, stacklevel=4)
+    return found
+
+
+def _search(form: Form, able: tuple[Target, ...]) -> Found:
+    """The best library that is shipped; else the best that was compiled before, or can be."""
+    if not able:
+        return Found(why=f"{CHOICE}=numpy")
+    try:
+        names = {target: _name(form, target) for target in able}
+    except TowtankError as error:
+        return Found(why=_bare(error))
+    bad = ""
+    for target in able if form.extra is None else ():
+        path = build.SHIPPED_LIBRARIES / names[target]
+        if _there(path):
+            try:
+                return Found(_loaded(path, target), "shipped", bad, target)
+            except (OSError, AttributeError) as error:
+                bad = bad or f"{path} cannot be loaded ({error}). Install towtank again"
+    lacking = _lacking()
+    for target in able:
+        path = cache_folder() / names[target]
+        if _there(path):
+            try:
+                return Found(_loaded(path, target), "cache", bad, target)
+            except (OSError, AttributeError) as error:
+                return Found(why=f"{path} cannot be loaded ({error}). Remove it, so that it is compiled again")
+        if not lacking:
+            return Found(why=bad, target=target, pending=True)
+    return Found(why=bad or lacking)
+
+
+def _compiled(form: Form, able: tuple[Target, ...]) -> Found:
+    """Compile ``form`` into the cache: for the best target, or for the next one that the compiler knows."""
+    why = ""
+    try:
+        texts = _texts(form)
+        for target in able:
+            path = cache_folder() / _name(form, target)
+            try:
+                found = Found(_loaded(path if _there(path) else compile_library(texts, target, path), target), "cache")
+            except (TowtankError, OSError, AttributeError) as error:
+                why = why or _bare(error)
+                continue
+            build.prune(cache_folder())
+            return replace(found, target=target)
+    except TowtankError as error:
+        why = _bare(error)
+    return Found(why=why)
+
+
+def _bare(error: Exception) -> str:
+    return str(error).removeprefix("engine: ").rstrip(".")
+
+
+def _name(form: Form, target: Target) -> str:
+    return library_name(form, target, "".join(_texts(form).values()) if form.extra else "")
+
+
+@functools.cache
+def _texts(form: Form) -> dict[str, str]:
+    """C text of ``form``, traced once per process.
+
+    Raises
+    ------
+    TowtankError
+        No CasADi, or the extra load does not run on symbols.
+    """
+    lacking = _no_casadi()
+    if lacking:
+        raise TowtankError(f"engine: {lacking}.")
+    try:
+        return c_text(form)
+    except TowtankError:
+        raise
+    except Exception as error:
+        if form.extra is None:
+            raise
+        raise TowtankError(
+            f"engine: the extra load {form.extra.name!r} does not run on symbols ({type(error).__name__}: "
+            f"{str(error)[:300]}). Use +, -, *, / and the functions of ops, and no if or math on its arguments."
+        ) from error
+
+
+def _there(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:
+        return False
 
 
 @functools.cache
 def _loaded(path: Path, target: Target) -> Library:
+    """Load a library.
+
+    Raises
+    ------
+    OSError, AttributeError
+        Not a whole library of this machine, or not one of the engine.
+    """
+    _check_whole(path)
     handle = ctypes.CDLL(str(path))
     for name in ("run_one", "run_pack"):
         getattr(handle, name).restype = _INTEGER
@@ -153,3 +294,28 @@ def _loaded(path: Path, target: Target) -> Library:
     handle.jacobians.restype = None
     handle.jacobians.argtypes = [_INTEGER, _REALS, _INTEGER, *[_REALS] * 6]
     return Library(path, target, handle)
+
+
+def _check_whole(path: Path) -> None:
+    """Refuse a file that ends before the segments its header lists: the system would end the program on loading it.
+
+    Only 64-bit ELF is looked into; other formats are left to the system's loader.
+
+    Raises
+    ------
+    OSError
+        The file is cut off.
+    """
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if head[:4] != b"\x7fELF" or len(head) < 64 or head[4] != 2:
+        return
+    order = "<" if head[5] == 1 else ">"
+    (first,) = struct.unpack_from(order + "Q", head, 32)
+    size, count = struct.unpack_from(order + "2H", head, 54)
+    for at in range(first, first + size * count, size):
+        if at + size > len(head):
+            raise OSError("its header is cut off")
+        begin, _, _, length = struct.unpack_from(order + "4Q", head, at + 8)
+        if begin + length > path.stat().st_size:
+            raise OSError("it is cut off")
