@@ -1,7 +1,7 @@
 """Build hook: compiles the engine into src/towtank/engine/lib/, so that neither CasADi nor a compiler is needed to run.
 
-A wheel gets every target of its platform; an editable installation the best one that this machine runs. Without CasADi or
-a C compiler, or with TOWTANK_NO_ENGINE=1, the package is built without libraries and runs on numpy.
+A wheel gets every target of its platform; an editable installation the best one that this machine runs. Without CasADi
+or a C compiler, or with TOWTANK_NO_ENGINE=1, the package is built without libraries and runs on numpy.
 """
 
 from __future__ import annotations

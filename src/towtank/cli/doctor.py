@@ -24,8 +24,16 @@ def doctor(json: Json = False, debug: Debug = False) -> None:
     Example: towtank doctor --json
     """
     with answering("doctor", json, debug) as reply:
-        found = [_python(), *(_library(name, _REINSTALL) for name in _LIBRARIES), *_optional()]
-        reply.summary |= {"items": found, "missing": [item["name"] for item in found if not item["installed"]]}
+        engine, cpu = _engine(), _cpu()
+        found = [
+            _python(),
+            *(_library(name, _REINSTALL) for name in _LIBRARIES),
+            _engine_item(engine),
+            cpu,
+            *_optional(),
+        ]
+        missing = [item["name"] for item in found if not item["installed"]]
+        reply.summary |= {"items": found, "missing": missing, "engine": engine}
         _print(reply, found)
 
 
@@ -64,11 +72,54 @@ def _library(name: str, remedy: str) -> dict[str, Any]:
     return _item(name, _version_of(name), True, "core library", remedy)
 
 
+def _engine() -> dict[str, Any]:
+    """How a craft of the usual form runs. ``from``: shipped, cache, first use (it is compiled then) or "" for numpy."""
+    from towtank.engine.form import SHIPPED
+    from towtank.engine.library import CHOICE, find
+    from towtank.errors import InputError
+
+    choice = os.environ.get(CHOICE, "")
+    out = {"path": "numpy", "lanes": 1, "from": "", "library": "", "why": "", "choice": choice}
+    try:
+        found = find(SHIPPED[0])
+    except InputError as error:
+        return out | {"path": "none", "why": str(error)}
+    if found.target:
+        out |= {"path": found.target.name, "lanes": found.target.lanes}
+        out["from"] = "first use" if found.pending else found.origin
+    return out | {"why": found.why, "library": str(found.library.path) if found.library else ""}
+
+
+_ORIGINS = {
+    "shipped": "compiled when the package was installed",
+    "cache": "compiled before, kept in the user's cache",
+    "first use": "compiled at its first use, then kept in the user's cache",
+}
+
+
+def _engine_item(engine: dict[str, Any]) -> dict[str, Any]:
+    if engine["path"] == "numpy" and engine["choice"]:
+        return _item("engine", "numpy", False, f"the closed loop, not compiled: {engine['why']}", "")
+    if not engine["from"]:
+        state = "cannot run" if engine["path"] == "none" else "runs on numpy, some hundred times slower"
+        return _item("engine", "", False, f"the closed loop {state}", engine["why"])
+    item = _item("engine", f"{engine['path']}, {engine['lanes']} lanes", False, _ORIGINS[engine["from"]], "")
+    return item | ({"use": f"{item['use']}; {engine['why']}"} if engine["why"] else {})
+
+
+def _cpu() -> dict[str, Any]:
+    from towtank.engine.library import able
+
+    sets = " ".join(target.name for target in able())
+    return _item("CPU", sets, False, "its instruction sets that the engine has code for, best first", "")
+
+
 def _optional() -> list[dict[str, Any]]:
-    compiler = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), "")
+    from towtank.engine.build import compiler
+
     return [
-        _item("casadi", _version_of("casadi"), False, "optimal control and code generation", "pip install casadi"),
-        _item("C compiler", compiler, False, "code generation", "apt-get install gcc, or your system's compiler"),
+        _item("casadi", _version_of("casadi"), False, "compiles other forms of the engine", "pip install casadi"),
+        _item("C compiler", compiler() or "", False, "the same", "apt-get install gcc, or your system's compiler"),
         _item(
             "OpenFOAM",
             os.environ.get("WM_PROJECT_VERSION", "") or shutil.which("simpleFoam") or "",
