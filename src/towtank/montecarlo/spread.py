@@ -96,8 +96,8 @@ class Ranks:
         its correlation is that of the first.
         """
         names = [name for name, values in columns.items() if np.ptp(values[:RANKED]) > 0.0]
-        table = np.array([columns[name][:RANKED] for name in names]).reshape(len(names), -1)
-        each = _ranked(table) if table.shape[1] > 1 else np.zeros((len(names), 1))
+        table = np.array([columns[name][:RANKED] for name in names]).reshape(len(names), -1 if names else 0)
+        each = _ranked(table) if names else table
         first = [int(np.argmax(np.abs(row) > TIED)) for row in each @ each.T]
         groups = [[name for name, f in zip(names, first, strict=True) if f == i] for i in range(len(names))]
         self.names = tuple("/".join(group) for group in groups if group)
