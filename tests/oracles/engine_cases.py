@@ -80,7 +80,7 @@ def figure():
         Leg("hold", HELD, 10.03),
         Leg("turn", Orders(rudder=-0.42, **turn), 60.0, Until("psi", 0.9), required=True),
         Leg("check", Orders(rudder=0.42, **turn), 60.0, Until("psi", 0.6), required=True),
-        Leg("dive", Orders(**{**turn, "depth": 6.0}, steer=1.0, heading=0.6), 40.0, Until("z", 5.4)),
+        Leg("dive", Orders(**{**turn, "depth": 6.0}, steer=1.0, heading=0.6), 40.0, Until("z", 4.7)),
         Leg("line", line, 20.0),
     ]
 
