@@ -13,7 +13,7 @@ from towtank.cli.app import app
 
 runner = CliRunner()
 CRAFT = "hokie"
-STAGES = ("craft", "plan", "tow", "derive", "trials", "verdict", "report")
+STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "verdict", "report")
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +44,7 @@ def test_the_study_holds_every_file_of_the_contract(first: tuple[Path, dict, str
     for name, noun in (
         ("derivatives.json", "derivatives"),
         ("model.json", "model"),
+        ("mc.json", "mc"),
         ("verdict.json", "verdict"),
         ("trials/index.json", "trials"),
         ("study.json", "study"),
