@@ -152,15 +152,26 @@ typedef struct {
   double lx[LEN(dynamics_jac3_row)], lt[LEN(dynamics_jac4_row)];
 } Local;
 
-/* Tangent of the rates: direct + W load. */
-INLINE void rates_tangent(const double *W, const Local *j, const int64_t *direction, int lanes, const V *x, const V *asked, V *rate) {
-  V load[6];
-  for (int i = 0; i < NX; i++) rate[i] = ALL(0.0);
-  for (int i = 0; i < 6; i++) load[i] = ALL(0.0);
-  for (int l = 0; l < lanes; l++) {
-    column(dynamics_jac2_col, dynamics_jac2_row, j->dt, direction[l], l, rate);
-    column(dynamics_jac4_col, dynamics_jac4_row, j->lt, direction[l], l, load);
+/* What the parameters of a pack of directions do to the rates and to the load at a point. */
+typedef struct { V rate[NX], load[6]; } Drive;
+
+/* Fill the drives of all packs at a point. The places filled are the same at every point, so the others stay zero.
+   Filled for all packs before any is used: a pack that is read right after its lanes were written stalls. */
+static void fill(const Local *j, const int64_t *direction, int64_t directions, Drive *out) {
+  for (int64_t i = 0; i < directions; i++) {
+    int64_t d = direction[i];
+    if (d >= FREE) continue;
+    double *rate = (double *)out[i / WIDE].rate + i % WIDE, *load = (double *)out[i / WIDE].load + i % WIDE;
+    for (int c = dynamics_jac2_col[d]; c < dynamics_jac2_col[d + 1]; c++) rate[dynamics_jac2_row[c] * WIDE] = j->dt[c];
+    for (int c = dynamics_jac4_col[d]; c < dynamics_jac4_col[d + 1]; c++) load[dynamics_jac4_row[c] * WIDE] = j->lt[c];
   }
+}
+
+/* Tangent of the rates: direct + W load. */
+INLINE void rates_tangent(const double *W, const Local *j, const Drive *drive, const V *x, const V *asked, V *rate) {
+  V load[6];
+  for (int i = 0; i < NX; i++) rate[i] = drive->rate[i];
+  for (int i = 0; i < 6; i++) load[i] = drive->load[i];
   TIMES(dynamics_jac0, NX, j->dx, x, rate);
   TIMES(dynamics_jac1, NF, j->da, asked, rate);
   TIMES(dynamics_jac3, NX, j->lx, x, load);
@@ -168,13 +179,13 @@ INLINE void rates_tangent(const double *W, const Local *j, const int64_t *direct
     for (int k = 0; k < 6; k++) rate[7 + i] += ALL(W[6 * i + k]) * load[k];
 }
 
-/* Tangents of one step of RK4 in a pack of directions. */
-static __attribute__((noinline)) void step_tangent(const double *W, const Local *j, const int64_t *direction, int lanes, double dt, V *x, const V *asked) {
+/* Tangents of one step of RK4 in a pack of directions; drive[0], drive[stride], ... belong to its four points. */
+static __attribute__((noinline)) void step_tangent(const double *W, const Local *j, const Drive *drive, int64_t stride, double dt, V *x, const V *asked) {
   V sum[NX], rate[NX], at[NX];
   for (int i = 0; i < NX; i++) { sum[i] = x[i]; at[i] = x[i]; }
 #pragma GCC unroll 1
   for (int g = 0; g < 4; g++) {
-    rates_tangent(W, j + g, direction, lanes, at, asked, rate);
+    rates_tangent(W, j + g, drive + g * stride, at, asked, rate);
     double on = g < 3 ? TO[g + 1] * dt : 0.0;
     for (int i = 0; i < NX; i++) { sum[i] += ALL(SHARE[g] * dt) * rate[i]; at[i] = x[i] + ALL(on) * rate[i]; }
   }
@@ -232,10 +243,12 @@ static void tangents_out(const Slope *a, int64_t k, const double *x, const doubl
 __attribute__((visibility("default"))) int tangents(const Slope *a) {
   int64_t packs = (a->directions + WIDE - 1) / WIDE;
   double dt = a->tick / (double)a->steps, x[NX], m[NM], asked[NF], rates[NM];
-  Directions *D = aligned_alloc(64, (packs * sizeof(Directions) + 63) / 64 * 64);
+  size_t size = packs * (sizeof(Directions) + 4 * sizeof(Drive)) + 64;
+  Directions *D = aligned_alloc(64, (size + 63) / 64 * 64);
   Local local[4];
   if (!D) return 1;
-  memset(D, 0, packs * sizeof(Directions));
+  memset(D, 0, size);
+  Drive *drive = (Drive *)(D + packs);
   memcpy(x, a->start, sizeof x);
   memcpy(m, a->start + NX, sizeof m);
   for (int64_t d = 0; d < a->directions; d++)
@@ -254,12 +267,11 @@ __attribute__((visibility("default"))) int tangents(const Slope *a) {
       double at[4][NX], next[NX];
       step(a->p, x, asked, dt, at, next);
 #pragma GCC unroll 1
-      for (int g = 0; g < 4; g++)
+      for (int g = 0; g < 4; g++) {
         dynamics_jac(a->p, at[g], asked, local[g].dx, local[g].da, local[g].dt, local[g].lx, local[g].lt);
-      for (int64_t q = 0; q < packs; q++) {
-        int lanes = (int)(a->directions - q * WIDE < WIDE ? a->directions - q * WIDE : WIDE);
-        step_tangent(a->p + INVERSE, local, a->direction + q * WIDE, lanes, dt, D[q].x, D[q].asked);
+        fill(local + g, a->direction, a->directions, drive + g * packs);
       }
+      for (int64_t q = 0; q < packs; q++) step_tangent(a->p + INVERSE, local, drive + q, packs, dt, D[q].x, D[q].asked);
       memcpy(x, next, sizeof x);
     }
     tangents_out(a, k, x, ref, D, packs);
