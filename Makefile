@@ -8,6 +8,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 JOBS   ?= $(shell nproc 2>/dev/null || echo 2)
 OUT    ?= hokie
+ENGINE := hatch_build.py $(wildcard src/towtank/symbols.py src/towtank/engine/*.py src/towtank/engine/c/* \
+            src/towtank/model/*.py src/towtank/pilot/*.py)
 
 .PHONY: help install run test lint bench bench-engine validate clean
 .DEFAULT_GOAL := help
@@ -22,19 +24,24 @@ help:
 	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
 	@echo "make clean     remove $(VENV)/, caches and bench/"
 
-install: $(VENV)/.installed
+install: $(VENV)/.engine
 
-$(VENV)/.installed: pyproject.toml hatch_build.py .ci/venv.sh
+$(VENV)/.installed: pyproject.toml .ci/venv.sh
 	bash .ci/venv.sh "$(PYTHON)" "$(VENV)"
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+# The installation compiles the engine; it is compiled again after its sources changed.
+$(VENV)/.engine: $(ENGINE) | $(VENV)/.installed
+	[ -z "$$(find $(ENGINE) -newer $(VENV)/.installed)" ] || $(BIN)/python -m pip install --quiet --no-deps --editable .
 	@touch $@
 
 $(VENV)/.tools: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --group dev
 	@touch $@
 
-run: $(VENV)/.installed
+run: $(VENV)/.engine
 	$(BIN)/towtank run hokie --out "$(OUT)"
 
 lint: $(VENV)/.tools
@@ -50,10 +57,10 @@ validate: $(VENV)/.tools
 	$(BIN)/python validation/suboff.py
 	$(BIN)/pytest -m validate
 
-bench: $(VENV)/.installed
+bench: $(VENV)/.engine
 	$(BIN)/python benchmarks/bench.py
 
-bench-engine: $(VENV)/.tools
+bench-engine: $(VENV)/.engine $(VENV)/.tools
 	$(BIN)/python benchmarks/engine.py
 
 clean:

@@ -98,7 +98,7 @@ _ORIGINS = {
 
 
 def _engine_item(engine: dict[str, Any]) -> dict[str, Any]:
-    if engine["path"] == "numpy" and engine["choice"]:
+    if engine["choice"] == "numpy":
         return _item("engine", "numpy", False, f"the closed loop, not compiled: {engine['why']}", "")
     if not engine["from"]:
         state = "cannot run" if engine["path"] == "none" else "runs on numpy, some hundred times slower"

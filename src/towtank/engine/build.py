@@ -128,13 +128,16 @@ def compile_all(jobs: Sequence[Job]) -> list[str]:
     Raises
     ------
     TowtankError
-        No compiler, or no temporary folder.
+        No compiler, no temporary folder, or a folder that cannot be written.
     """
     import tempfile
     from concurrent.futures import ThreadPoolExecutor
 
     from towtank.parallel import cores
 
+    for job in jobs:
+        if unwritable(job.out.parent):
+            raise TowtankError(unwritable(job.out.parent))
     cc = compiler()
     if cc is None:
         raise TowtankError(
@@ -176,21 +179,31 @@ def _linked(cc: str, work: Path, out: Path) -> str:
         return error
     part = out.with_name(f".{out.name}.{os.getpid()}.part")
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
         with part.open("wb") as file:
             file.write(made.read_bytes())
             file.flush()
             os.fsync(file.fileno())
         part.replace(out)
     except OSError as problem:
-        return (
-            f"engine: {out.parent} cannot be written ({problem.strerror or problem}). Set XDG_CACHE_HOME to a folder "
-            "that can, so that compiled libraries are kept."
-        )
-    finally:
-        if part.exists():
-            part.unlink()
+        part.unlink(missing_ok=True)
+        return _unwritten(out.parent, problem.strerror)
     return ""
+
+
+def unwritable(folder: Path) -> str:
+    """Make ``folder`` where it is missing; why nothing can be written there, "" when it can."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        return _unwritten(folder, problem.strerror)
+    return "" if os.access(folder, os.W_OK | os.X_OK) else _unwritten(folder, "no permission")
+
+
+def _unwritten(folder: Path, reason: str | None) -> str:
+    return (
+        f"engine: {folder} cannot be written ({reason}). Set XDG_CACHE_HOME to a folder that can, so that compiled "
+        "libraries are kept."
+    )
 
 
 def _failure(command: list[str]) -> str:

@@ -193,7 +193,7 @@ def _search(form: Form, able: tuple[Target, ...]) -> Found:
     try:
         names = {target: _name(form, target) for target in able}
     except TowtankError as error:
-        return Found(why=_bare(error))
+        return Found(why=_bare(str(error)))
     bad = ""
     for target in able if form.extra is None else ():
         path = build.SHIPPED_LIBRARIES / names[target]
@@ -217,7 +217,9 @@ def _search(form: Form, able: tuple[Target, ...]) -> Found:
 
 def _compiled(form: Form, able: tuple[Target, ...]) -> Found:
     """Compile ``form`` into the cache: for the best target, or for the next one that the compiler knows."""
-    why = ""
+    why = _bare(build.unwritable(cache_folder()))
+    if why:
+        return Found(why=why)
     try:
         texts = _texts(form)
         for target in able:
@@ -225,17 +227,17 @@ def _compiled(form: Form, able: tuple[Target, ...]) -> Found:
             try:
                 found = Found(_loaded(path if _there(path) else compile_library(texts, target, path), target), "cache")
             except (TowtankError, OSError, AttributeError) as error:
-                why = why or _bare(error)
+                why = why or _bare(str(error))
                 continue
             build.prune(cache_folder())
-            return replace(found, target=target)
+            return replace(found, target=target, why=why)
     except TowtankError as error:
-        why = _bare(error)
+        why = _bare(str(error))
     return Found(why=why)
 
 
-def _bare(error: Exception) -> str:
-    return str(error).removeprefix("engine: ").rstrip(".")
+def _bare(text: str) -> str:
+    return text.removeprefix("engine: ").rstrip(".")
 
 
 def _name(form: Form, target: Target) -> str:
