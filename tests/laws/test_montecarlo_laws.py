@@ -15,6 +15,7 @@ from towtank.craft.library import read_craft
 from towtank.derive.derive import derive
 from towtank.engine.plan import Ended
 from towtank.errors import InputError, TowtankError
+from towtank.figures.montecarlo import channel_fan
 from towtank.model.equations import Model
 from towtank.montecarlo import study as study_module
 from towtank.montecarlo.draw import Tolerances, draw, tolerances
@@ -25,6 +26,10 @@ from towtank.montecarlo.spread import spread_of, wilson
 from towtank.montecarlo.study import monte_carlo, study_of
 from towtank.plan.standard import standard_plan
 from towtank.progress import Silent
+from towtank.report.blocks import Picture, Table
+from towtank.report.of_montecarlo import uncertainty
+from towtank.report.pictures import Sketchbook
+from towtank.report.study import gather
 from towtank.tank.campaign import tow
 from towtank.tank.fast.tank import FastTank
 from towtank.trials.circle import circle_ready
@@ -287,6 +292,23 @@ def test_bands_hold_the_best_estimate_and_end_while_most_are_under_way(hokie: Mo
     inside = (bands.quantiles["psi"][0] <= bands.best["psi"]) & (bands.best["psi"] <= bands.quantiles["psi"][-1])
     assert inside.mean() > 0.9
     assert bands.tracks["x"].shape == (40, len(bands.time))
+
+
+def test_the_page_shows_the_bands_and_every_index(hokie: Model):
+    found = monte_carlo(hokie, 40, trials=several)
+    section = uncertainty(gather([hokie, found]), Sketchbook("t"))
+    pictures = [block for block in section.blocks if isinstance(block, Picture)]
+    tables = [block for block in section.blocks if isinstance(block, Table)]
+    assert len(pictures) == 2
+    shown = {(row[0], row[1].replace(" ", "_")) for row in tables[0].rows}
+    own = {(t.name, n) for t in found.trials.values() for n in t.indices if n not in found.common}
+    assert own - shown == {(t, n) for t, n in own if n.endswith("_lengths")}
+    assert section.blocks[1].words.count(str(found.planes["horizontal"])) == 1
+    ax = channel_fan(found, "zigzag-10-10", "psi")
+    drawn = next(line for line in ax.lines if line.get_label() == "best estimate").get_ydata()
+    np.testing.assert_allclose(drawn, np.degrees(found.bands["zigzag-10-10"].best["psi"]))
+    empty = uncertainty(gather([hokie]), Sketchbook("u"))
+    assert "towtank mc" in empty.blocks[0].words
 
 
 def test_an_added_mass_that_may_be_negative_is_drawn_again_and_a_wild_one_refused(hokie: Model):

@@ -50,9 +50,11 @@ def circle_fan(it: MonteCarlo, trial: str, ax: Axes | None = None) -> Axes:
         ax.plot([side * low, side * high], [level, level], "|-", color=INK, linewidth=1.2, markersize=8, label=words)
     frame(ax, "to starboard of the initial course [m]", "along the initial course [m]", zero=False)
     ax.set_aspect("equal", adjustable="datalim")
-    ax.margins(0.08)
+    ax.margins(0.05)
+    low, high = ax.get_ylim()
+    ax.set_ylim(low - 0.24 * (high - low), high)  # room for the legend below the tracks
     head(ax, f"Turning circle, {trial}", it.level, _words(it))
-    legend(ax, loc="best")
+    legend(ax, loc="lower left")
     return ax
 
 

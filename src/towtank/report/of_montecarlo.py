@@ -35,10 +35,11 @@ def _stability(it: MonteCarlo) -> list[Block]:
     out: list[Block] = []
     for plane in it.planes.values():
         low, high = plane.index.band
+        which = "index G" if plane.plane == "horizontal" else "index G, which leaves the righting moment out,"
         out.append(
             Text(
                 f"With fixed fins, the probability of being stable in straight flight, {plane.plane} plane, is "
-                f"{plane}. Stability index G {number(plane.index.best, 3)}, 90 % between {number(low, 3)} and "
+                f"{plane}. Stability {which} {number(plane.index.best, 3)}, 90 % between {number(low, 3)} and "
                 f"{number(high, 3)}.",
                 "good" if plane.interval[0] > 0.5 else "bad" if plane.interval[1] < 0.5 else "plain",
             )
