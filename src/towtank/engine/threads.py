@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import threading
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -16,7 +17,9 @@ from towtank.parallel import cores
 from towtank.progress import Progress
 
 PIECE = 64
-"""Packs handed to a thread at a time."""
+"""Most packs handed to a thread at a time."""
+SHARES = 4
+"""Pieces for each thread, at least, where there are packs enough."""
 ALONE = 1
 """Up to this many trajectories are run one by one, without packs."""
 
@@ -32,7 +35,9 @@ def run_threads(compiled: Library, arrays: Arrays, progress: Progress, threads: 
     if alone:
         compiled.run(_task(arrays, 0, count, stop), alone=True)
         return
-    size = PIECE * compiled.target.lanes
+    shared, lanes = threads or cores(), compiled.target.lanes
+    # A small ensemble is cut finer, so that every thread has its part and the last one does not keep the others waiting.
+    size = lanes * min(PIECE, max(1, math.ceil(count / (SHARES * shared * lanes))))
     pieces: SimpleQueue[tuple[int, int]] = SimpleQueue()
     for first in range(0, count, size):
         pieces.put((first, min(first + size, count)))
@@ -48,7 +53,7 @@ def run_threads(compiled: Library, arrays: Arrays, progress: Progress, threads: 
             compiled.run(_task(arrays, first, last, stop), alone=False)
             done.put(last - first)
 
-    workers = [threading.Thread(target=work, daemon=True) for _ in range(min(threads or cores(), total))]
+    workers = [threading.Thread(target=work, daemon=True) for _ in range(min(shared, total))]
     progress.start("trajectories", total)
     try:
         for worker in workers:
