@@ -7,6 +7,7 @@ import functools
 import os
 import struct
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -173,6 +174,9 @@ def _nameless(form: Form) -> Form:
 def _kept(form: Form, able: tuple[Target, ...], surroundings: tuple[str, ...]) -> Found:
     """``_search`` once per process and surroundings; compiles what is pending and warns of what went wrong."""
     found = _search(form, able)
+    if found.library and found.origin == "cache":
+        with suppress(OSError):
+            os.utime(found.library.path)  # the cache drops what was not used for longest
     if found.pending:
         found = replace(done := _compiled(form, able), why=done.why or found.why)
     if found.why and able:
