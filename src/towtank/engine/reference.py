@@ -307,7 +307,7 @@ class _Lanes:
         if not lost.any():
             return y1, h, c
         for lane in np.flatnonzero(lost).tolist():
-            self.close(lane, Ended.TOO_FAST if speed[lane] < 1e300 else Ended.NOT_FINITE)
+            self.close(lane, Ended.TOO_FAST if self.a.fastest <= speed[lane] < 1e300 else Ended.NOT_FINITE)
         mask = self._value(lost.astype(float))
         self.x = [self.pick(mask, a, b) for a, b in zip(x0, self.x, strict=True)]
         y1 = [self.pick(mask, a, b) for a, b in zip(y0, y1, strict=True)]

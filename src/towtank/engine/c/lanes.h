@@ -61,8 +61,8 @@ INLINE void SINCOS(T a, T *s, T *c) {
   T half = k * C(0.5), odd = (half - FLOOR(half)) * C(2.0); /* k odd: sine and cosine change places */
   T turn = (half - odd * C(0.5)) * C(0.5), back = (turn - FLOOR(turn)) * C(2.0); /* k mod 4 in {2, 3} */
   T sign = C(1.0) - C(2.0) * back;
-  *s = sign * (sine + odd * (cosine - sine));
-  *c = sign * (C(1.0) - C(2.0) * odd) * (cosine + odd * (sine - cosine));
+  *s = sign * PICK(odd, cosine, sine);
+  *c = sign * (C(1.0) - C(2.0) * odd) * PICK(odd, sine, cosine);
 }
 
 INLINE T ATAN2(T y, T x) {

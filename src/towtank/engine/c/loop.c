@@ -213,7 +213,7 @@ INLINE void tick(const Task *a, Pack *k, double tg) {
     if (any(lost)) {
       EACH(l) if (LANE(lost, l) != 0.0) {
         double v = LANE(y1[SPEED], l);
-        int code = v == v && v < 1e300 ? TOO_FAST : NOT_FINITE;
+        int code = v >= a->fastest && v < 1e300 ? TOO_FAST : NOT_FINITE;
         for (int i = 0; i < NX; i++) SET(k->x[i], l, LANE(x0[i], l));
         for (int i = 0; i < NY; i++) SET(y1[i], l, LANE(y0[i], l));
         SET(h, l, 0.0); SET(c, l, 0.0);
