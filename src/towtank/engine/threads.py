@@ -36,7 +36,7 @@ def run_threads(compiled: Library, arrays: Arrays, progress: Progress, threads: 
         compiled.run(_task(arrays, 0, count, stop), alone=True)
         return
     shared, lanes = threads or cores(), compiled.target.lanes
-    # A small ensemble is cut finer, so that every thread has its part and the last one does not keep the others waiting.
+    # A small ensemble is cut finer: every thread has its part, and none waits long for the last.
     size = lanes * min(PIECE, max(1, math.ceil(count / (SHARES * shared * lanes))))
     pieces: SimpleQueue[tuple[int, int]] = SimpleQueue()
     for first in range(0, count, size):
