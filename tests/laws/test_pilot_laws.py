@@ -87,7 +87,8 @@ def test_no_fin_is_asked_beyond_its_limit_and_yaw_and_pitch_keep_their_ratio(rud
     fins = allocation(synthetic.craft())
     order = RUDDER_FIRST if first else YAW_AND_PITCH_FIRST
     granted = share((rudder, elevator, aileron), fins.rows, fins.limits, order, MATH)
-    assert max(abs(a) for a in fins.fins(granted)) <= np.radians(25.0) * (1.0 + 1e-12)
+    # A demand up to ROUND_OFF is granted on top of a full fin; the sums add a few units in the last place.
+    assert max(abs(a) for a in fins.fins(granted)) <= np.radians(25.0) + ROUND_OFF + 4.0 * np.spacing(0.5)
     if not first:
         assert granted[0] * elevator == pytest.approx(granted[1] * rudder, abs=1e-12)
     else:
