@@ -22,6 +22,16 @@ _PUBLIC = {
     "Model": "towtank.model.equations",
     "ExtraLoad": "towtank.model.extra",
     "read_model": "towtank.model.files",
+    "design_pilot": "towtank.pilot.design",
+    "read_pilot": "towtank.pilot.files",
+    "Orders": "towtank.pilot.orders",
+    "fly": "towtank.engine.run",
+    "Ensemble": "towtank.engine.run",
+    "Leg": "towtank.engine.plan",
+    "Until": "towtank.engine.plan",
+    "Gauge": "towtank.engine.plan",
+    "Log": "towtank.engine.plan",
+    "Clock": "towtank.engine.plan",
     "straight_run": "towtank.trials.straight",
     "turning_circle": "towtank.trials.circle",
     "zigzag": "towtank.trials.zigzag",
@@ -33,6 +43,7 @@ _PUBLIC = {
     "assess": "towtank.verdict.assess",
     "monte_carlo": "towtank.montecarlo.study",
     "Tolerances": "towtank.montecarlo.draw",
+    "vary": "towtank.sweep.vary",
 }
 
 _STAGES = {"derive", "report"}

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +19,7 @@ from towtank.errors import InputError
 from towtank.pilot.design import design_pilot
 from towtank.pilot.orders import Orders
 
+ROOT = Path(__file__).parents[2]
 HELD = Orders(piloted=1.0, steer=1.0, dive=1.0)
 LEGS = (
     Leg("straight", HELD, 7.03),
@@ -187,6 +192,17 @@ def test_heading_is_unwrapped_through_whole_turns(go):
 def test_bad_input_is_refused_with_the_reason(go, options, words):
     with pytest.raises(InputError, match=words):
         go(**options)
+
+
+def test_the_script_of_the_page_runs_as_printed(tmp_path):
+    from towtank.model.files import write_model
+
+    script = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "engine.md").read_text("utf-8"), flags=re.S)
+    (tmp_path / "hokie").mkdir()
+    write_model(synthetic.model(synthetic.STABLE), tmp_path / "hokie" / "model.json")
+    code = f"{script[1]}\nassert done.finished.all() and many.finished.all() and abs(many.state[0, 2] - 2.0) < 0.5"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_start_of_the_wrong_size_is_refused(craft):
