@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 import synthetic_craft as synthetic
+from towtank.craft.hull import Ellipsoid
 from towtank.engine.plan import Clock, Ended, Gauge, Leg, Log, Stat, Until
 from towtank.engine.run import Ensemble, fly
 from towtank.engine.start import at
 from towtank.errors import InputError
+from towtank.model.files import write_model
 from towtank.pilot.design import design_pilot
 from towtank.pilot.orders import Orders
 
@@ -195,11 +197,11 @@ def test_bad_input_is_refused_with_the_reason(go, options, words):
 
 
 def test_the_script_of_the_page_runs_as_printed(tmp_path):
-    from towtank.model.files import write_model
-
     script = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "engine.md").read_text("utf-8"), flags=re.S)
     (tmp_path / "hokie").mkdir()
-    write_model(synthetic.model(synthetic.STABLE), tmp_path / "hokie" / "model.json")
+    model = synthetic.model(synthetic.STABLE)
+    shaped = replace(model, craft=replace(model.craft, profile=Ellipsoid(8.15, 0.945)))
+    write_model(shaped, tmp_path / "hokie" / "model.json")
     code = f"{script[1]}\nassert done.finished.all() and many.finished.all() and abs(many.state[0, 2] - 2.0) < 0.5"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
