@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -185,7 +188,26 @@ def test_heading_is_unwrapped_through_whole_turns(go):
         ({"gauges": [Gauge("depth")]}, "no channel 'depth'"),
         ({"gauges": [Gauge("z")] * 40}, "room for 32"),
         ({"ensemble": Ensemble(2, {"Yuw": np.zeros(2)})}, "no parameter 'Yuw'"),
-        ({"ensemble": Ensemble(2, {"Yuv": np.zeros(3)})}, "one row for each"),
+        ({"ensemble": Ensemble(2, {"Yuv": np.zeros(3)})}, "one number for each trajectory"),
+        ({"ensemble": Ensemble(2, {"Yuv": np.zeros((2, 0))})}, "one number for each trajectory"),
+        ({"ensemble": Ensemble(2, {"Yuv": np.zeros((2, 2))})}, "one number for each trajectory"),
+        ({"ensemble": Ensemble(2, {"Yuv": np.float64(1.0)})}, "one number for each trajectory"),
+        ({"ensemble": Ensemble(2, {"time_constant0": np.array([0.2, -1.0])})}, "positive"),
+        ({"ensemble": Ensemble(2, {"time_constant0": np.array([0.2, 0.001])})}, "unstable"),
+        ({"clock": Clock(0.6, 1)}, "unstable"),
+        ({"ensemble": Ensemble(0)}, "one or more"),
+        ({"threads": -1}, "one or more"),
+        ({"thrust": np.nan}, "must be finite"),
+        ({"current": (0.1, 0.2)}, "three"),
+        ({"ensemble": Ensemble(2, start=np.zeros((3, 20)) + 1.0)}, "length 1"),
+        ({"ensemble": Ensemble(2, start=np.tile(at([0.0] * 16), (3, 1)))}, "one row for each"),
+        ({"ensemble": Ensemble(2, orders={"depth": np.array([np.nan, 1.0])})}, "finite numbers"),
+        ({"ensemble": Ensemble(2, orders={"depth": np.zeros(3)})}, "one for each"),
+        ({"ensemble": Ensemble(2, orders={"depth": np.zeros((2, 1))})}, "one for each"),
+        ({"legs": [Leg("run", HELD, 1.0, Until("psi", np.nan))]}, "finite level"),
+        ({"legs": [Leg("run", HELD, 1.0, Until("rudder", 0.1))]}, "kept by the steering"),
+        ({"legs": [Leg("run", HELD, 1.0, Until("delta5", 0.1))]}, "no channel 'delta5'"),
+        ({"gauges": [Gauge("z", np.inf)]}, "finite level"),
         ({"ensemble": Ensemble(2, {"Yuv": np.array([1.0, np.inf])})}, "not finite"),
         ({"ensemble": Ensemble(2, {"Yvdot": np.array([0.0, 1e6])})}, "not positive definite"),
         ({"ensemble": Ensemble(2, orders={"course made good": np.zeros(2)})}, "no order"),
@@ -212,6 +234,94 @@ def test_a_start_of_the_wrong_size_is_refused(craft):
         fly(craft, np.zeros(5), LEGS, thrust=1.0)
 
 
-def test_a_clock_that_cannot_run_is_refused():
+@pytest.mark.parametrize("given", [(0.0, 1), (0.1, 0), (0.1, 2.0)])
+def test_a_clock_that_cannot_run_is_refused(given):
     with pytest.raises(InputError, match="positive period"):
-        Clock(0.0, 1)
+        Clock(*given)
+
+
+@pytest.mark.parametrize("every", [0, -1, 2.0])
+def test_a_log_that_cannot_be_kept_is_refused(every):
+    with pytest.raises(InputError, match="whole number"):
+        Log(every=every)
+
+
+@pytest.mark.parametrize("level", [0.55, 0.60, 0.7])
+def test_a_leg_that_begins_on_its_level_waits_for_the_next_passing(go, level):
+    turn = Orders(piloted=1.0, rudder=-0.2, dive=1.0)
+    done = go([Leg("there", turn, 300.0, Until("psi", level)), Leg("again", turn, 20.0, Until("psi", level))])
+    assert done.by_event[0].tolist() == [True, False]
+    assert done.duration("again")[0] == pytest.approx(20.0, abs=1e-9)
+
+
+def test_fast_fins_get_the_steps_they_need(craft):
+    quick = synthetic.model(synthetic.STABLE, lag=0.005, rate=300.0)
+    turn = [Leg("turn", Orders(rudder=0.2), 20.0)]
+    given = {"thrust": float(quick.thrust(1.0))}
+    start = at([0.0] * 6 + [1.0] + [0.0] * 9)
+    plain, fine = fly(quick, start, turn, **given), fly(quick, start, turn, clock=Clock(0.1, 400), **given)
+    asked = quick.fin_angles(0.2, 0.0, 0.0)
+    assert [float(plain.at("turn", f"delta{i + 1}", event=False)[0]) for i in range(4)] == pytest.approx(
+        asked, abs=1e-9
+    )
+    assert plain.state[0] == pytest.approx(fine.state[0], abs=1e-6)
+
+
+def test_what_stops_a_trajectory_is_its_own_speed(go):
+    start = np.tile(at([0.0] * 6 + [1.0] + [0.0] * 9), (3, 1))
+    start[1, 7] = 3.0
+    run = [Leg("run", HELD, 10.0)]
+    beside = go(run, thrust=5e4, ensemble=Ensemble(3, start=start))
+    alone = go(run, thrust=5e4)
+    assert beside.ended[0] == alone.ended[0] == Ended.TOO_FAST
+    assert beside.end_time[[0, 2]] == pytest.approx(alone.end_time[0], abs=1e-9)
+    assert beside.end_time[1] > alone.end_time[0]
+
+
+def test_the_last_sample_does_not_depend_on_the_neighbours(go):
+    legs = [Leg("on", HELD, 4.0, Until("x", 5.0), required=True), Leg("after", HELD, 4.0)]
+    start = np.tile(at([0.0] * 6 + [1.0, 0.05] + [0.0] * 8), (2, 1))
+    start[1, 0] = 4.0
+    together = go(legs, ensemble=Ensemble(2, start=start), log=Log())
+    alone = go(legs, start=[0.0] * 6 + [1.0, 0.05] + [0.0] * 8, log=Log())
+    assert together.ended.tolist() == [Ended.LATE, Ended.DONE]
+    assert together.end_time[1] > together.end_time[0]
+    np.testing.assert_allclose(together.log[0], alone.log[0], atol=1e-12)
+
+
+def test_an_interruption_keeps_the_ended_lanes_of_a_pack(go):
+    # Interrupted while the pack is under way: lane 0 has ended long before the others.
+    legs = [Leg("short", HELD, 1.0, Until("x", 0.0), required=True), Leg("long", HELD, 3e6)]
+    start = np.tile(at([-0.5] + [0.0] * 5 + [1.0] + [0.0] * 9), (8, 1))
+    start[0, 0] = -5.0
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    done = go(legs, ensemble=Ensemble(8, start=start))
+    assert done.ended[0] == Ended.LATE
+    assert np.all(np.isfinite(done.state[0]))
+    assert np.all(done.ended[1:] == Ended.STOPPED)
+    assert np.all(np.isnan(done.state[1:]))
+
+
+def test_an_error_of_a_worker_is_raised_here(go, monkeypatch):
+    from towtank.engine.library import Library
+
+    def broken(*_, **__):
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(Library, "run", broken)
+    with pytest.raises(RuntimeError, match="broken"):
+        go([Leg("run", HELD, 1.0)], ensemble=Ensemble(4))
+
+
+@pytest.mark.parametrize("path", ["numpy", ""])
+@pytest.mark.parametrize(
+    ("change", "thrust", "reason"),
+    [({"Kpp": 1e13}, 20.0, Ended.NOT_FINITE), ({"Yuv": 1e200}, 20.0, Ended.NOT_FINITE), ({}, 5e4, Ended.TOO_FAST)],
+)
+def test_a_motion_out_of_bounds_stops_with_its_reason_on_every_path(craft, monkeypatch, path, change, thrust, reason):
+    monkeypatch.setenv("TOWTANK_ENGINE", path)
+    start = at([0.0] * 6 + [1.0, 0.1, 0.0, 1.0, 0.0, 0.0] + [0.0] * 4)
+    done = fly(craft.with_values(**change), start, [Leg("run", Orders(), 20.0)], thrust=thrust)
+    assert done.ended[0] == reason
+    assert np.all(np.isfinite(done.state))
+    assert done.end_time[0] < 20.0

@@ -30,7 +30,7 @@ class Task(ctypes.Structure):
     _fields_ = (
         ("first", _INTEGER), ("last", _INTEGER), ("common", _REALS), ("varying", _INTEGER), ("which", _INTEGERS),
         ("varied", _REALS), ("start", _REALS), ("start_stride", _INTEGER), ("legs", _INTEGER), ("plan", _REALS),
-        ("plan_stride", _INTEGER), ("tick", _REAL), ("steps", _INTEGER), ("fastest", _REAL), ("gauges", _INTEGER),
+        ("plan_stride", _INTEGER), ("tick", _REAL), ("steps", _INTEGER), ("fastest", _REALS), ("gauges", _INTEGER),
         ("gauge", _REALS), ("channels", _INTEGER), ("channel", _INTEGERS), ("every", _INTEGER), ("samples", _INTEGER),
         ("log", _REALS), ("stats", _REALS), ("marks", _REALS), ("end", _REALS), ("status", _REALS),
         ("stop", ctypes.c_void_p),

@@ -17,6 +17,8 @@ from towtank.pilot.law import GAINS, Pilot
 Places = NDArray[np.int64]
 """Places in the vector of parameters."""
 
+_POSITIVE = ("max_angle", "max_rate", "time_constant")
+
 MASS = (*BODY, *ADDED)
 """Parameters that change the mass matrix or may: those for which its inverse must be taken again."""
 
@@ -79,8 +81,8 @@ def _screw(form: Form, k: Constants) -> dict[str, float]:
     return out
 
 
-def varied(form: Form, base: Array, columns: Mapping[str, Array]) -> tuple[Places, Array]:
-    """Places (m,) and values (N, m) of the parameters that differ between N trajectories.
+def varied(form: Form, base: Array, columns: Mapping[str, Array], count: int) -> tuple[Places, Array]:
+    """Places (m,) and values (N, m) of the parameters that differ between N = ``count`` trajectories.
 
     columns : name -> (N,).   When a mass, an inertia, a CG or an added mass is among them, the inverse of the mass
     matrix of every trajectory is taken as well.
@@ -88,11 +90,10 @@ def varied(form: Form, base: Array, columns: Mapping[str, Array]) -> tuple[Place
     Raises
     ------
     InputError
-        A name that this form does not have, columns of different length, a value that is not finite, or a mass matrix
+        A name that this form does not have, a column that is not (N,), a value that is not finite, or a mass matrix
         that is not positive definite.
     """
     table = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
-    count = {len(values) for values in table.values()}
     unknown = [name for name in table if name not in form.place or name.startswith("inverse")]
     if unknown:
         raise InputError(
@@ -100,13 +101,18 @@ def varied(form: Form, base: Array, columns: Mapping[str, Array]) -> tuple[Place
             f"...), the body ({', '.join(BODY[:5])}, ...), thrust, current_north, current_east, current_down, "
             "pilot_<gain>, max_angle0, ... (towtank.engine.form.Form.names lists all)."
         )
-    if len(count) != 1:
-        raise InputError(f"ensemble: columns have {sorted(count)} values. Give each parameter one per trajectory.")
     for name, values in table.items():
+        if values.shape != (count,):
+            raise InputError(
+                f"ensemble of {count}: {name} has the shape {values.shape}. Give one number for each trajectory, "
+                f"({count},)."
+            )
         if not np.all(np.isfinite(values)):
             raise InputError(f"ensemble: {name} has a value that is not finite. Give finite numbers.")
+        if name.startswith(_POSITIVE) and not np.all(values > 0.0):
+            raise InputError(f"ensemble: {name} has a value of {values.min():g}. Limits and lags of fins are positive.")
     if set(table) & set(MASS):
-        inverse = np.linalg.inv(_mass_matrices(form, base, table, count.pop()))
+        inverse = np.linalg.inv(_mass_matrices(form, base, table, count))
         table |= {f"inverse{i}{j}": inverse[:, i, j] for i in range(6) for j in range(6)}
     places = np.array([form.place[name] for name in table], dtype=np.int64)
     return places, np.ascontiguousarray(np.stack(list(table.values()), axis=1))

@@ -8,7 +8,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from towtank.engine.loop import channels
+from towtank.engine.loop import channels, observed
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.pilot.orders import Orders
@@ -46,7 +46,11 @@ class Ended(IntEnum):
 
 @dataclass(frozen=True)
 class Until:
-    """A leg ends when ``channel`` (its magnitude if ``absolute``) passes ``level`` from the side the leg began on."""
+    """A leg ends when ``channel`` (its magnitude if ``absolute``) passes ``level`` from the side the leg began on.
+
+    A leg that begins on its level takes its side from the first motion away from it. The heading psi is unwrapped; roll
+    phi jumps at 180 deg, which counts as passing. What the steering keeps (rudder, trims, ...) cannot be waited for.
+    """
 
     channel: str
     level: float
@@ -87,7 +91,7 @@ class Clock:
     steps: int = 2
 
     def __post_init__(self) -> None:
-        if not (self.tick > 0.0 and np.isfinite(self.tick) and self.steps >= 1):
+        if not (self.tick > 0.0 and np.isfinite(self.tick) and isinstance(self.steps, int) and self.steps >= 1):
             raise InputError(
                 f"clock: tick {self.tick:g} s with {self.steps} steps. Give a positive period and one step or more."
             )
@@ -99,6 +103,10 @@ class Log:
 
     names: tuple[str, ...] = ()
     every: int = 1
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.every, int) and self.every >= 1):
+            raise InputError(f"log: every {self.every!r} ticks. Give a whole number, one or more.")
 
 
 def leg_table(legs: Sequence[Leg], fins: int) -> Array:
@@ -120,9 +128,22 @@ def leg_table(legs: Sequence[Leg], fins: int) -> Array:
             raise InputError(f"leg {leg.name}: an order is not finite ({leg.orders}). Give finite numbers.")
         end = [-1.0, 0.0, 0.0]
         if leg.until is not None:
-            end = [place(leg.until.channel, fins), float(leg.until.absolute), leg.until.level]
+            end = [_awaited(leg, leg.until, fins), float(leg.until.absolute), leg.until.level]
         rows.append([leg.within, *end, float(leg.required), *orders])
     return np.array(rows)
+
+
+def _awaited(leg: Leg, until: Until, fins: int) -> int:
+    """Place of the channel a leg waits for."""
+    found = place(until.channel, fins)
+    if not np.isfinite(until.level):
+        raise InputError(f"leg {leg.name}: until {until.channel} = {until.level}. Give a finite level.")
+    if found >= observed(fins) and until.channel != "fin_travel":
+        raise InputError(
+            f"leg {leg.name}: {until.channel} is kept by the steering and jumps at a control period, so no moment can "
+            "be found at which it passes a level. Wait for a channel of the motion."
+        )
+    return found
 
 
 def gauge_table(gauges: Sequence[Gauge], fins: int) -> Array:
@@ -135,6 +156,9 @@ def gauge_table(gauges: Sequence[Gauge], fins: int) -> Array:
     """
     if len(gauges) > MOST_GAUGES:
         raise InputError(f"run: {len(gauges)} gauges; the loop has room for {MOST_GAUGES}. Use fewer, or log channels.")
+    for gauge in gauges:
+        if not np.isfinite(gauge.level):
+            raise InputError(f"gauge of {gauge.channel}: level {gauge.level}. Give a finite level.")
     return np.array([[place(g.channel, fins), float(g.absolute), g.level] for g in gauges]).reshape(-1, 3)
 
 

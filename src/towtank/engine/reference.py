@@ -21,7 +21,7 @@ from towtank.model.algebra import MATH, NUMPY, Ops, product
 from towtank.pilot.law import wrapped
 from towtank.progress import Progress
 
-EPS, SEARCH = 1e-9, 8
+EPS, SEARCH = 1e-9, 12
 BY_EVENT, BY_TIME = 1.0, 2.0
 HEAD = 5
 TO, SHARE = (0.5, 0.5, 1.0, 0.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
@@ -41,13 +41,18 @@ def run_numpy(form: Form, arrays: Arrays, progress: Progress) -> None:
                 ticks += 1
                 lanes.tick(arrays.clock.tick * ticks)
                 if lanes.any(lanes.live):
-                    lanes.order(lanes.live * 0.0 + 1.0)
+                    lanes.order(lanes.live)
             lanes.record(ticks)
     except KeyboardInterrupt:
         return
     finally:
         lanes.unload()
         progress.done("ticks")
+
+
+def _side(e: Array) -> Array:
+    """Side of its level an event stands on (N,); round-off of the search that ended the leg before is on the level."""
+    return np.asarray(np.where(np.abs(e) > EPS, np.sign(e), 0.0))
 
 
 @dataclass
@@ -116,6 +121,14 @@ class _Lanes:
             x = total
         return x
 
+    def moved(self, x: list[Any], before: list[Any], h: Any) -> tuple[list[Any], list[Any]]:
+        """State and channels after ``h``; NaN where floats refuse a motion that is no longer finite."""
+        try:
+            x = self.advance(x, h)
+            return x, self.look(x, before)
+        except (ValueError, OverflowError, ZeroDivisionError):
+            return [math.nan] * len(x), [math.nan] * len(before)
+
     def look(self, x: list[Any], before: list[Any]) -> list[Any]:
         """Channels of ``x``; heading unwrapped from and fin travel added to those ``before``."""
         y = [*observe(self.p, x, self.ref, self.tools.ops), *before[self.kept :]]
@@ -137,7 +150,7 @@ class _Lanes:
         self.asked = [self.pick(c, a, b) for a, b in zip(asked, self.asked, strict=True)]
         self.rates = [self.pick(c, a, b) for a, b in zip(s.memory_rates, self.rates, strict=True)]
         self.y[self.kept + 3] = self.pick(c, s.heading, self.y[self.kept + 3])
-        self.y = self.keep(self.y)
+        self.y = [self.pick(c, a, b) for a, b in zip(self.keep(self.y), self.y, strict=True)]
 
     def event(self, y: list[Any]) -> Array:
         """Distance (N,) of the event channel from its level."""
@@ -158,8 +171,7 @@ class _Lanes:
 
     def fresh(self, lane: int) -> None:
         """Gauges and the side of the event at the start of a leg."""
-        e = float(self.event(self.y)[lane])
-        self.side[lane] = 0.0 if self.head[lane, 1] < 0.0 else float(np.sign(e))
+        self.side[lane] = _side(self.event(self.y))[lane]
         t = float(self._row(self.t)[lane])
         for g, (channel, absolute, _) in enumerate(self.a.gauge):
             v = float(self._row(self.y[int(channel)])[lane])
@@ -230,8 +242,7 @@ class _Lanes:
             span = at_high - at_low
             step = np.where(triggered, high - at_high * (high - low) / np.where(span == 0.0, 1.0, span), whole)
             tau = self._value(step)
-            x = self.advance(x0, tau)
-            y = self.look(x, y0)
+            x, y = self.moved(x0, y0, tau)
             e = self.event(y)
             if not np.any(triggered & (np.abs(e) > 1e-12)):
                 break
@@ -273,8 +284,7 @@ class _Lanes:
         while True:
             h = ops.fmax(ops.fmin(self.end, until) - self.t, 0.0) * self.live
             x0, y0 = self.x, self.y
-            x1 = self.advance(x0, h)
-            y1 = self.look(x1, y0)
+            x1, y1 = self.moved(x0, y0, h)
             c = self.live * 0.0
             if np.any(self.head[:, 1] >= 0.0):
                 e0, e1 = self.event(y0), self.event(y1)
@@ -283,14 +293,14 @@ class _Lanes:
                 c = self._value(hit.astype(float))
                 if hit.any():
                     x1, y1, h = self.land(x0, y0, h, c, e0, e1)
-                self.side = np.where((self.side == 0.0) & watched, np.sign(e1), self.side)
+                self.side = np.where((self.side == 0.0) & watched, _side(e1), self.side)
             self.x = x1
             y1, h, c = self._lost(x0, y0, y1, h, c)
+            self.m = [m + h * rate for m, rate in zip(self.m, self.rates, strict=True)]
             y1 = self.keep(y1)
             y1[self.kept + 3] = y0[self.kept + 3]
             if len(self.a.gauge):
                 self.measure(y0, y1, h)
-            self.m = [m + h * rate for m, rate in zip(self.m, self.rates, strict=True)]
             self.t = self.t + h
             self.y = y1
             ended = pick(c, 1.0, ops.positive(self.t - self.end + EPS)) * self.live
@@ -307,7 +317,7 @@ class _Lanes:
         if not lost.any():
             return y1, h, c
         for lane in np.flatnonzero(lost).tolist():
-            self.close(lane, Ended.TOO_FAST if self.a.fastest <= speed[lane] < 1e300 else Ended.NOT_FINITE)
+            self.close(lane, Ended.TOO_FAST if self.a.fastest[lane] <= speed[lane] < 1e300 else Ended.NOT_FINITE)
         mask = self._value(lost.astype(float))
         self.x = [self.pick(mask, a, b) for a, b in zip(x0, self.x, strict=True)]
         y1 = [self.pick(mask, a, b) for a, b in zip(y0, y1, strict=True)]

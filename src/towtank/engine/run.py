@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from towtank.engine.clock import check_step, clock_of
 from towtank.engine.flights import Flights
 from towtank.engine.form import Form, form_of
 from towtank.engine.library import Library, library
@@ -21,7 +22,7 @@ from towtank.pilot.law import NO_PILOT, Pilot
 from towtank.progress import Progress, Silent
 
 FASTEST = 10.0
-"""A trajectory is stopped beyond this multiple of the larger of the craft's speed and its own at the start."""
+"""A trajectory is stopped beyond this multiple of the larger of the craft's speed and its own at its start."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Arrays:
     status: Array
     clock: Clock
     every: int
-    fastest: float
+    fastest: Array
 
     @property
     def count(self) -> int:
@@ -63,6 +64,9 @@ class Ensemble:
     start: Array | None = None
     orders: Mapping[str, Array] = field(default_factory=dict)
 
+
+_UNIT = 1e-6
+"""Largest departure of a start's quaternion from the length 1."""
 
 ONE = Ensemble()
 
@@ -87,21 +91,22 @@ def fly(
     Parameters
     ----------
     start : (13 + n + 3,) state and memory of the steering, from ``towtank.engine.start.at``.
-    thrust : [N].   current : (3,) [m/s, NED].   clock : control period and steps.   log : what is kept over time,
-        nothing when left out.   gauges : what is watched in every leg.   ensemble : what differs between trajectories.
-    threads : that share the trajectories; all cores when left out.
+    thrust : [N].   current : (3,) [m/s, NED].   clock : control period and steps, ``clock_of`` when left out.
+    log : what is kept over time, nothing when left out.   gauges : what is watched in every leg.
+    ensemble : what differs between trajectories.   threads : that share them; all cores when left out.
 
-    An interruption (Ctrl-C) keeps the trajectories that are finished; the others are marked ``Ended.STOPPED``.
+    An interruption (Ctrl-C) keeps the trajectories that have ended; the others are marked ``Ended.STOPPED``. A run of
+    less than a tenth of a second cannot be interrupted.
 
     Raises
     ------
     InputError
         A start, leg, gauge or parameter that cannot be used.
     """
-    form = form_of(model)
-    arrays = _arrays(
-        form, model, pilot or NO_PILOT, start, legs, thrust, current, clock or Clock(), log, gauges, ensemble
-    )
+    form, clock = form_of(model), clock or clock_of(model, model.craft.speed)
+    check_step(model, clock, ensemble.parameters)
+    _check(model, thrust, current, legs, log, gauges, ensemble, threads)
+    arrays = _arrays(form, model, pilot or NO_PILOT, start, legs, thrust, current, clock, log, gauges, ensemble)
     compiled = library(form)
     if compiled is not None:
         from towtank.engine.threads import run_threads
@@ -114,6 +119,30 @@ def fly(
     return _flights(form, model, arrays, legs, gauges, log, compiled)
 
 
+def _check(
+    model: Model, thrust: float, current: Sequence[float], legs: Sequence[Leg], log: Log | None,
+    gauges: Sequence[Gauge], ensemble: Ensemble, threads: int | None,
+) -> None:  # fmt: skip
+    """Refuse what no form could fly."""
+    flow = np.asarray(current, dtype=float)
+    if flow.shape != (3,) or not np.all(np.isfinite([*flow, thrust])):
+        raise InputError(
+            f"run of {model.craft.name}: thrust {thrust} and current {current} must be finite, the current three "
+            "numbers."
+        )
+    if ensemble.count < 1 or (threads is not None and threads < 1):
+        raise InputError(f"run: {ensemble.count} trajectories on {threads} threads. Ask for one or more of each.")
+    used = [
+        *(log.names if log else ()),
+        *(g.channel for g in gauges),
+        *(leg.until.channel for leg in legs if leg.until),
+    ]
+    have = {f"delta{i + 1}" for i in range(len(model.craft.fins))}
+    absent = [name for name in used if name.startswith("delta") and name not in have]
+    if absent:
+        raise InputError(f"run: no channel {absent[0]!r}. Craft {model.craft.name} has {len(have)} fins.")
+
+
 def _arrays(
     form: Form, model: Model, pilot: Pilot, start: Sequence[float] | Array, legs: Sequence[Leg], thrust: float,
     current: Sequence[float], clock: Clock, log: Log | None, gauges: Sequence[Gauge], ensemble: Ensemble,
@@ -124,18 +153,17 @@ def _arrays(
     which: Places = np.zeros(0, dtype=np.int64)
     values: Array = np.zeros((count, 0))
     if ensemble.parameters:
-        which, values = varied(form, common, ensemble.parameters)
+        which, values = varied(form, common, ensemble.parameters, count)
     begin = _start(model, form, start if ensemble.start is None else ensemble.start)
     plan = leg_table(legs, fins)
     if ensemble.orders:
         plan = _orders(plan, legs, ensemble)
-    for what, rows in (("parameters", len(values)), ("start", len(begin) if begin.ndim == 2 else count)):
-        if rows != count:
-            raise InputError(f"ensemble of {count}: {what} hold {rows} trajectories. Give one row for each.")
+    if begin.ndim == 2 and len(begin) != count:
+        raise InputError(f"ensemble of {count}: the start holds {len(begin)} trajectories. Give one row for each.")
     logged: Places = np.array([place(name, fins) for name in (log.names or names)] if log else [], dtype=np.int64)
     longest = float(plan[..., 0].sum(axis=-1).max())
     samples = math.floor(longest / (clock.tick * log.every) + 1e-9) + 1 if log else 0
-    speed = np.linalg.norm(begin[..., 7:10], axis=-1).max()
+    speed = np.maximum(np.linalg.norm(begin[..., 7:10], axis=-1), model.craft.speed)
     return Arrays(
         common=common, which=which, varied=values, start=begin, plan=plan, gauge=gauge_table(gauges, fins),
         channel=logged, log=np.full((count, samples, len(logged)), np.nan),
@@ -143,7 +171,8 @@ def _arrays(
         marks=np.full((count, len(legs), 2 + len(names)), np.nan),
         end=np.full((count, KINEMATIC + fins + len(MEMORY)), np.nan),
         status=np.tile([float(Ended.STOPPED), 0.0], (count, 1)),
-        clock=clock, every=log.every if log else 1, fastest=FASTEST * max(float(speed), model.craft.speed),
+        clock=clock, every=log.every if log else 1,
+        fastest=np.ascontiguousarray(np.broadcast_to(FASTEST * speed, (count,))),
     )  # fmt: skip
 
 
@@ -156,6 +185,11 @@ def _start(model: Model, form: Form, start: Sequence[float] | Array) -> Array:
         raise InputError(
             f"run of {model.craft.name}: the start needs {size} finite numbers (13 of the craft with its quaternion, "
             f"{have} fin angles, 3 of the steering), got shape {given.shape}. Build it with towtank.engine.start.at."
+        )
+    if np.abs(np.linalg.norm(given[..., 3:7], axis=-1) - 1.0).max() > _UNIT:
+        raise InputError(
+            f"run of {model.craft.name}: the start's quaternion (entries 3 to 6) has not the length 1. Build the start "
+            "with towtank.engine.start.at, or normalise it."
         )
     none = np.zeros((*given.shape[:-1], form.fins - have))
     return np.ascontiguousarray(np.concatenate([given[..., : size - 3], none, given[..., size - 3 :]], axis=-1))
@@ -170,6 +204,11 @@ def _orders(plan: Array, legs: Sequence[Leg], ensemble: Ensemble) -> Array:
         if name not in ORDERS:
             raise InputError(f"ensemble: no order {name!r}. Choose from {', '.join(ORDERS)}.")
         given = np.asarray(values, dtype=float)
+        if given.shape not in ((ensemble.count,), (ensemble.count, len(legs))) or not np.all(np.isfinite(given)):
+            raise InputError(
+                f"ensemble of {ensemble.count}: order {name} has the shape {given.shape}. Give finite numbers, one for "
+                f"each trajectory ({ensemble.count},), or for each of its legs ({ensemble.count}, {len(legs)})."
+            )
         table[:, :, 5 + ORDERS.index(name)] = given[:, None] if given.ndim == 1 else given
     return table
 

@@ -5,7 +5,7 @@
 #include "lanes.h"
 #include "model.h"
 
-enum { HEAD = LEG_HEAD, MOST = 32, SEARCH = 8 };
+enum { HEAD = LEG_HEAD, MOST = 32, SEARCH = 12 };
 #define EPS 1e-9
 #define PI 3.14159265358979323846
 
@@ -14,7 +14,8 @@ typedef struct {
   T p[NP], x[NX], m[NM], y[NY], ref[NO];
   T granted[3], asked[NF], rates[NM];
   T t, end, live;                       /* time, end of the leg, 1.0 while running */
-  T channel, absolute, level, side;     /* event of the leg, and the side of it the leg began on */
+  T channel, absolute, level, side;     /* event of the leg, and the side of it the leg began on; 0.0 on the level itself */
+  T fastest;
   int64_t leg[LANES], at[LANES];
   T stat[MOST][STATS];
 } Pack;
@@ -59,7 +60,9 @@ static __attribute__((noinline)) void order(Pack *k, T c) {
   for (int i = 0; i < NF; i++) k->asked[i] = PICK(c, asked[i], k->asked[i]);
   for (int i = 0; i < NM; i++) k->rates[i] = PICK(c, rates[i], k->rates[i]);
   k->y[NS + 3] = PICK(c, heading[0], k->y[NS + 3]);
-  keep(k, k->y);
+  T y[NY];
+  keep(k, y);
+  for (int i = NS; i < NS + 7; i++) if (i != NS + 3) k->y[i] = PICK(c, y[i], k->y[i]);
 }
 
 /* Distance of the event channel from its level, lane by lane. */
@@ -79,6 +82,9 @@ INLINE T event(const Pack *k, const T *y) {
 #define SET(v, l, value) ((v)[l] = (value))
 #endif
 
+/* Side of its level an event stands on; round-off of the search that ended the leg before counts as on the level. */
+INLINE T side_of(T e) { return WHERE(LESS(C(EPS), ABS(e)), SIGN(e)); }
+
 static void fresh(const Task *a, Pack *k, int l) {
   double nan = __builtin_nan("");
   for (int64_t g = 0; g < a->gauges; g++) {
@@ -96,8 +102,7 @@ static void begin(const Task *a, Pack *k, int l) {
   SET(k->end, l, LANE(k->t, l) + row[0]);
   SET(k->channel, l, row[1]); SET(k->absolute, l, row[2]); SET(k->level, l, row[3]);
   for (int i = 0; i < NO; i++) SET(k->ref[i], l, row[HEAD + i]);
-  double e = LANE(event(k, k->y), l);
-  SET(k->side, l, row[1] < 0.0 ? 0.0 : (double)(e > 0.0) - (double)(e < 0.0));
+  SET(k->side, l, LANE(side_of(event(k, k->y)), l));
   fresh(a, k, l);
 }
 
@@ -184,8 +189,7 @@ static __attribute__((noinline)) void turn_over(const Task *a, Pack *k, T c) {
     for (int i = 0; i < NY; i++) k->y[i] = PICK(changed, y[i], k->y[i]);
     order(k, changed);
     EACH(l) if (LANE(changed, l) != 0.0) { /* with the new line in the channels */
-      double e = LANE(event(k, k->y), l);
-      SET(k->side, l, LANE(k->channel, l) < 0.0 ? 0.0 : (double)(e > 0.0) - (double)(e < 0.0));
+      SET(k->side, l, LANE(side_of(event(k, k->y)), l));
       fresh(a, k, l);
     }
   }
@@ -206,24 +210,24 @@ INLINE void tick(const Task *a, Pack *k, double tg) {
       c = LESS(e1 * k->side, C(0.0)) * watched;
       if (any(c)) h = land(a, k, x0, y0, y1, h, c, e0, e1);
       /* a leg that began on its level gets its side from the first motion */
-      k->side = PICK(SAME(k->side, C(0.0)) * watched, SIGN(e1), k->side);
+      k->side = PICK(SAME(k->side, C(0.0)) * watched, side_of(e1), k->side);
     }
-    T sound = LESS(y1[SPEED], C(a->fastest)) * SAME(y1[Z], y1[Z]) * SAME(y1[PSI], y1[PSI]);
+    T sound = LESS(y1[SPEED], k->fastest) * SAME(y1[Z], y1[Z]) * SAME(y1[PSI], y1[PSI]);
     T lost = k->live * (C(1.0) - sound);
     if (any(lost)) {
       EACH(l) if (LANE(lost, l) != 0.0) {
         double v = LANE(y1[SPEED], l);
-        int code = v >= a->fastest && v < 1e300 ? TOO_FAST : NOT_FINITE;
+        int code = v >= LANE(k->fastest, l) && v < 1e300 ? TOO_FAST : NOT_FINITE;
         for (int i = 0; i < NX; i++) SET(k->x[i], l, LANE(x0[i], l));
         for (int i = 0; i < NY; i++) SET(y1[i], l, LANE(y0[i], l));
         SET(h, l, 0.0); SET(c, l, 0.0);
         close_lane(a, k, l, code);
       }
     }
+    for (int i = 0; i < NM; i++) k->m[i] += h * k->rates[i];
     keep(k, y1);
     y1[NS + 3] = y0[NS + 3];
     if (a->gauges) measure(a, k, y0, y1, h);
-    for (int i = 0; i < NM; i++) k->m[i] += h * k->rates[i];
     k->t += h;
     memcpy(k->y, y1, sizeof y1);
     if (any(k->live * MAX(c, LEQ(k->end - C(EPS), k->t)))) turn_over(a, k, c);
@@ -254,6 +258,7 @@ static void load(const Task *a, Pack *k, int64_t first) {
     for (int i = 0; i < NX; i++) SET(k->x[i], l, s[i]);
     for (int i = 0; i < NM; i++) SET(k->m[i], l, s[NX + i]);
     SET(k->live, l, 1.0);
+    SET(k->fastest, l, a->fastest[k->at[l]]);
   }
   for (int i = 0; i < NF; i++) none[DELTA + i] = k->x[NX - NF + i];
   EACH(l) begin(a, k, l); /* the orders, which the channels need */
@@ -262,7 +267,7 @@ static void load(const Task *a, Pack *k, int64_t first) {
   EACH(l) begin(a, k, l);
 }
 
-/* Trajectories a->from to a->to; returns how many were finished, all unless stopped. */
+/* Trajectories a->from to a->to; returns how many packs' trajectories were gone through, all unless stopped. */
 __attribute__((visibility("default"))) int64_t NAME(run)(const Task *a) {
   Pack k;
   for (int64_t first = a->from; first < a->to; first += LANES) {
@@ -270,20 +275,22 @@ __attribute__((visibility("default"))) int64_t NAME(run)(const Task *a) {
     int64_t n = 0;
     while (any(k.live)) {
       if (a->stop && *a->stop) {
-        EACH(l) close_lane(a, &k, l, STOPPED);
-        return first - a->from;
+        EACH(l) if (LANE(k.live, l) != 0.0) close_lane(a, &k, l, STOPPED);
+        break;
       }
       record(a, &k, n, first);
       n++;
       tick(a, &k, a->tick * (double)n);
-      if (any(k.live)) order(&k, C(1.0));
+      if (any(k.live)) order(&k, k.live);
     }
-    record(a, &k, n, first);
-    EACH(l) if (first + l < a->to) {
+    int stopped = a->stop && *a->stop;
+    if (!stopped) record(a, &k, n, first);
+    EACH(l) if (first + l < a->to && a->status[2 * k.at[l]] != STOPPED) {
       double *e = a->end + k.at[l] * (NX + NM);
       for (int i = 0; i < NX; i++) e[i] = LANE(k.x[i], l);
       for (int i = 0; i < NM; i++) e[NX + i] = LANE(k.m[i], l);
     }
+    if (stopped) return first - a->from;
   }
   return a->to - a->from;
 }

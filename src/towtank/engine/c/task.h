@@ -22,7 +22,7 @@ typedef struct {
   int64_t plan_stride;         /* legs * (LEG_HEAD + NO), or 0 when shared */
   double tick;                 /* control period [s] */
   int64_t steps;               /* RK4 steps in it */
-  double fastest;              /* speed [m/s] beyond which a trajectory is stopped */
+  const double *fastest;       /* (count) speed [m/s] beyond which a trajectory is stopped */
   int64_t gauges;
   const double *gauge;         /* (gauges, 3) channel, absolute?, level */
   int64_t channels;
