@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,15 +14,16 @@ from towtank.engine.plan import Clock, Ended, Gauge, Leg, Stat
 from towtank.engine.run import Ensemble, fly
 from towtank.engine.start import at
 from towtank.errors import ArtefactError, InputError
+from towtank.report.build import report
 from towtank.trials.circle import circle_ready, turning_circle
 from towtank.trials.files import read_trajectory, write_index, write_trajectory
 from towtank.trials.mission import lawnmower
 from towtank.trials.pullout import pull_out, pull_out_ready
-from towtank.trials.ready import fly_ready, readings
+from towtank.trials.ready import fly_ready, readings, run_trial
 from towtank.trials.standard import standard_trials
 from towtank.trials.start import setting
 from towtank.trials.steps import depth_step, heading_step
-from towtank.trials.straight import straight_run
+from towtank.trials.straight import straight_ready, straight_run
 from towtank.trials.zigzag import zigzag, zigzag_ready
 
 
@@ -92,6 +94,47 @@ def test_a_motion_that_grows_without_bound_ends_the_trial_early(craft):
     assert trial.status.startswith("ended early: the ")
     assert np.isnan(trial.indices["yaw_rate"][0])
     assert np.all(np.isfinite(trial.position))
+
+
+@pytest.fixture(scope="module")
+def away():
+    """A straight run whose thrust carries the craft away in its only leg."""
+    model = synthetic.model(synthetic.STABLE)
+    trial = straight_ready(model)
+    return run_trial(model, replace(trial, setting=replace(trial.setting, thrust=3e4)))
+
+
+def test_a_trial_without_a_finished_leg_has_no_index_but_how_long_it_lasted(away):
+    assert "ran away" in away.status
+    numbers = {name for name, (value, _) in away.indices.items() if not np.isnan(value)}
+    assert numbers == {"duration"}
+    assert {"fin_rms", "fin_saturation", "fin_travel", "depth_change"} < away.indices.keys()
+
+
+def test_an_index_that_is_not_there_is_written_read_and_shown_as_none(away, tmp_path):
+    index = json.loads(write_index([away], tmp_path).read_text())
+    assert index["trials"][0]["indices"]["fin_rms"]["value"] is None
+    assert np.isnan(read_trajectory(tmp_path / "straight.nc").indices["fin_rms"][0])
+    page = report(tmp_path / "page.html", away).read_text()
+    assert "ran away" in page
+    assert not re.search(r">\s*nan\s*<", page)
+
+
+def test_effort_before_a_craft_ran_away_is_that_of_the_legs_it_finished():
+    model = synthetic.model(synthetic.STABLE)
+    wild, trial = model.with_values(Xuu=+400.0), circle_ready(model, "15 deg")
+    first = replace(trial.legs[0], name="first", within=4.0, until=None, required=False)
+    trial = replace(trial, legs=(first, *trial.legs), read=lambda flights: {})
+    flights = fly_ready(wild, trial)
+    done = int(np.count_nonzero(~np.isnan(flights.mark_time[0])))
+    assert flights.ended[0] in (Ended.TOO_FAST, Ended.NOT_FINITE)
+    assert 0 < done < len(trial.legs)
+    whole = fly_ready(wild, replace(trial, legs=trial.legs[:done]))
+    assert whole.finished[0]
+    got, wanted = readings(wild, trial, flights), readings(wild, trial, whole)
+    for name in ("fin_rms", "fin_saturation", "fin_travel", "fin_largest", "depth_change", "largest_pitch"):
+        assert got[name][0][0] == pytest.approx(wanted[name][0][0], rel=1e-9, abs=1e-12), name
+    assert got["fin_rms"][0][0] > 1.0
 
 
 def test_a_circle_that_does_not_go_round_says_how_far_it_got(craft):

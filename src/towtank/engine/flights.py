@@ -64,19 +64,30 @@ class Flights:
         i = self.leg(leg)
         return self.mark_time[:, i] - (self.mark_time[:, i - 1] if i else 0.0)
 
+    @property
+    def finished_time(self) -> Array:
+        """Time (N,) [s] of the last end of a leg; NaN where no leg was finished. ``over`` holds what came before it."""
+        with np.errstate(all="ignore"):
+            return np.asarray(np.fmax.reduce(self.mark_time, axis=1))
+
     def stat(self, leg: str, gauge: Gauge, stat: Stat) -> Array:
         """What ``gauge`` holds for a leg (N,)."""
         return self.stats[:, self.leg(leg), self.gauges.index(gauge), stat]
 
     def over(self, gauge: Gauge, stat: Stat) -> Array:
-        """What ``gauge`` holds over all finished legs (N,): sums of integrals and times, extremes of extremes."""
+        """What ``gauge`` holds over all finished legs (N,): sums of integrals and times, extremes of extremes.
+
+        NaN where no leg was finished.
+        """
         values = self.stats[:, :, self.gauges.index(gauge), stat]
         with np.errstate(all="ignore"):
             if stat is Stat.LOW:
-                return np.where(np.isnan(values).all(axis=1), np.nan, np.fmin.reduce(values, axis=1))
-            if stat is Stat.HIGH:
-                return np.where(np.isnan(values).all(axis=1), np.nan, np.fmax.reduce(values, axis=1))
-            return np.asarray(np.nansum(values, axis=1))
+                found = np.fmin.reduce(values, axis=1)
+            elif stat is Stat.HIGH:
+                found = np.fmax.reduce(values, axis=1)
+            else:
+                found = np.nansum(values, axis=1)
+        return np.where(np.isnan(values).all(axis=1), np.nan, found)
 
     def series(self, channel: str) -> Array:
         """Logged channel (N, S)."""

@@ -129,13 +129,17 @@ def _flown(flights: Flights) -> int:
 
 
 def _common(model: Model, trial: Ready, flights: Flights) -> Readings:
-    """Indices that every trial has: duration, changes, extremes, effort of the fins."""
+    """Indices that every trial has: duration, changes, extremes, effort of the fins.
+
+    The duration is that of the whole trial, the others are of the finished legs and NaN where none was: an unfinished
+    leg ends with a craft that ran away.
+    """
     degrees = np.degrees
-    lasting = flights.end_time
+    lasting = flights.finished_time
     start = trial.setting.state if trial.start is None else trial.start
     out: dict[str, tuple[Array, str]] = {
-        "duration": (lasting, "s"),
-        "depth_change": (flights.state[:, 2] - start[2], "m"),
+        "duration": (flights.end_time, "s"),
+        "depth_change": (last(flights, "z") - start[2], "m"),
         "largest_roll": (degrees(flights.over(ROLL, Stat.HIGH)), "deg"),
         "largest_pitch": (degrees(flights.over(PITCH, Stat.HIGH)), "deg"),
     }
