@@ -103,6 +103,15 @@ def test_the_response_to_a_step_is_that_of_its_record(change, side):
     assert np.sign(trial.attitude[-1, 2]) == side
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("primes", [synthetic.STABLE, synthetic.SUBOFF])
+def test_the_largest_change_of_heading_is_turned_to_the_side_that_was_ordered(primes, side):
+    trial = heading_step(synthetic.model(primes), f"{175.0 * side} deg", current=(0.0, -0.2 * side, 0.0))
+    assert trial.indices["rise_time"][0] > 0.0
+    assert abs(trial.indices["last_error"][0]) < 5.0
+    assert np.degrees(trial.attitude[-1, 2]) == pytest.approx(175.0 * side, abs=5.0)
+
+
 def test_a_step_that_ends_outside_its_band_has_no_settling_time(stable):
     trial = heading_step(stable, lengths=4.0)
     assert np.isnan(trial.indices["settling_time"][0])

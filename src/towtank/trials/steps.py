@@ -21,6 +21,9 @@ LEAD = 2.0
 """Lengths travelled on the old order before the step."""
 HEADING_LENGTHS, DEPTH_LENGTHS = 40.0, 70.0
 """Lengths travelled after the step."""
+LARGEST = np.radians(175.0)
+"""Largest change of heading [rad]. The pilot turns the shorter way round, which half a turn does not have: round-off
+would choose the side."""
 BAND = 0.05
 """Share of the step within which the craft counts as settled."""
 LEVELS = (0.1, 0.9, 1.0 - BAND, 1.0 + BAND)
@@ -40,7 +43,7 @@ def heading_step(
 
     Parameters
     ----------
-    change : new heading minus old; text with a unit or radians, positive to starboard, at most 180 deg.
+    change : new heading minus old; text with a unit or radians, positive to starboard, at most 175 deg.
     speed : through the water, [m/s] or text.   pilot : designed from the model when not given.
     current : (3,) velocity of the water [m/s, NED].   lengths : distance run after the order.
 
@@ -50,7 +53,7 @@ def heading_step(
     Raises
     ------
     InputError
-        A change of zero, beyond 180 deg, or without a unit.
+        A change of zero, beyond 175 deg either way, or without a unit.
     """
     return run_trial(model, heading_step_ready(model, change, speed, pilot, current, lengths))
 
@@ -64,7 +67,7 @@ def heading_step_ready(
     lengths: float = HEADING_LENGTHS,
 ) -> Ready:
     """The heading step, ready to fly; arguments as in ``heading_step``."""
-    step = angle(change, "change", np.pi, "beyond which the other way round is shorter")
+    step = angle(change, "change", LARGEST, "too near half a turn, beyond which the shorter way round is the other")
     if step == 0.0:
         raise InputError('change: a heading step of 0 deg tells nothing. Give an angle such as "30 deg".')
     s, away = setting(model, speed, pilot), Gauge("z", absolute=True)
