@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import synthetic_craft as synthetic
+from towtank.engine.clock import clock_of
 from towtank.engine.form import System
 from towtank.engine.loop import channels, command, observe
 from towtank.engine.plan import Clock, Leg, Log
@@ -19,7 +20,6 @@ from towtank.model.algebra import MATH, product
 from towtank.model.equations import right_hand_side_quaternion
 from towtank.pilot.law import NO_PILOT
 from towtank.pilot.orders import ORDERS
-from towtank.trials.ready import clock_of
 from towtank.trials.start import setting
 from towtank.trials.steps import adrift
 from towtank.trials.zigzag import zigzag_ready

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from towtank.engine.clock import clock_of
 from towtank.engine.flights import Flights
 from towtank.engine.plan import Ended, Log
 from towtank.engine.run import Ensemble
@@ -20,7 +21,7 @@ from towtank.montecarlo.draw import CURRENT, Drawn, Tolerances, draw, starts
 from towtank.montecarlo.packed import packed, unpacked
 from towtank.montecarlo.stable import neutral, stability
 from towtank.progress import Progress, Silent
-from towtank.trials.ready import Ready, clock_of, fly_ready, readings
+from towtank.trials.ready import Ready, fly_ready, readings
 
 BAND_CHANNELS = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "r", "rudder", "elevator", "speed")
 """Channels whose bands are kept over time, where the first piece of a study is flown."""

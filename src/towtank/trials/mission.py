@@ -37,6 +37,8 @@ PATIENCE = 3.0
 rest of the leg has its own share beside that."""
 SETTLED = 0.5
 """Share of a long leg after which the craft should have come onto it."""
+HELD = 1.0
+"""Lengths for which a line is held, at the least, before the turn onto the next begins."""
 
 _ACROSS, _DEEP = Gauge("across", absolute=True), Gauge("z")
 
@@ -69,7 +71,8 @@ def lawnmower(
     Raises
     ------
     InputError
-        No legs, a leg shorter than 8 craft lengths, a spacing below 4: the turns would take up the legs.
+        No legs, or the turns would take up the legs. A turn begins half its diameter before a corner (2 craft lengths
+        at the least); the spacing is at least one length more, and 4 lengths; a leg is twice that, and 8 lengths.
     """
     return run_trial(model, lawnmower_ready(model, legs, leg_length, spacing, depth, speed, pilot, current))
 
@@ -88,16 +91,12 @@ def lawnmower_ready(
     length = model.craft.length
     s = setting(model, speed, pilot)
     diameter = min(turning_diameter(model, s.speed, RUDDER_SHARE * fin_limit(model)), WIDEST * length)
+    early = max(2.0 * length, 0.5 * diameter)
     long_ = max(25.0 * length, 3.0 * diameter) if leg_length is None else si(leg_length, "m", "leg_length")
     short = max(10.0 * length, 1.5 * diameter) if spacing is None else si(spacing, "m", "spacing")
-    if legs < 1 or long_ < 8.0 * length or short < 4.0 * length:
-        raise InputError(
-            f"lawnmower of {legs} legs, {long_:.3g} m long, {short:.3g} m apart: needs at least one leg, legs of "
-            f"{8.0 * length:.3g} m and a spacing of {4.0 * length:.3g} m (8 and 4 craft lengths), or the turns take up "
-            "the legs. Give longer legs or a wider spacing."
-        )
+    _room(legs, long_, short, length, early)
     below, start = si(depth, "m", "depth"), adrift(s, current)
-    corners, early = _corners(legs, long_, short), max(2.0 * length, 0.5 * diameter)
+    corners = _corners(legs, long_, short)
     pieces = _pieces(s, corners, below, early, _lookahead(s, length), drifting(current))
     return Ready(
         name="lawnmower", kind="lawnmower", loop="closed", setting=s, legs=tuple(piece.leg for piece in pieces),
@@ -105,6 +104,29 @@ def lawnmower_ready(
         read=lambda flights: _indices(flights, pieces, below), status=lambda flights: _status(flights, pieces),
         curves=lambda _: {"track": {"north": [p[0] for p in corners], "east": [p[1] for p in corners]}},
     )  # fmt: skip
+
+
+def _room(legs: int, long_: float, short: float, length: float, early: float) -> None:
+    """Refuse lines [m] that a craft of ``length`` [m] cannot fly when it turns ``early`` [m] before their ends.
+
+    A short line is held for ``HELD`` lengths before the next turn; so is a long one after the part in which the craft
+    comes onto it, since its numbers are of that rest. Nothing is known of the spacing of a single leg.
+    """
+    need = early + HELD * length
+    least_long, least_short = max(8.0 * length, need / (1.0 - SETTLED)), max(4.0 * length, need)
+    slack = 1.0 - 1e-9
+    if legs < 1 or long_ < least_long * slack or (legs > 1 and short < least_short * slack):
+        raise InputError(
+            f"lawnmower of {legs} legs, {long_:.4g} m long, {short:.4g} m apart: this craft needs at least one leg, "
+            f"legs of {_upwards(least_long)} m and a spacing of {_upwards(least_short)} m, or the turns take up the "
+            f"legs: they begin {early:.3g} m before a corner. Give longer legs or a wider spacing."
+        )
+
+
+def _upwards(value: float) -> str:
+    """``value`` rounded up to four digits, so that what is printed suffices."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return f"{math.ceil(value / unit - 1e-6) * unit:.4g}"
 
 
 @dataclass(frozen=True)
@@ -157,7 +179,7 @@ def _pieces(
         orders = s.orders(dive=1.0, depth=depth, **entries)
         expected = length / max(s.speed - math.hypot(current[0], current[1]), 0.2 * s.speed)
         level, half = length - early, SETTLED * length
-        split = i % 2 == 1 and level > half
+        split = i % 2 == 1
         if split:
             onto = Leg(f"leg {i} coming on", orders, PATIENCE * expected, Until("along", half), required=True)
             pieces.append(_Piece(onto, i, False))

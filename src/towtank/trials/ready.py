@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from towtank.engine.clock import clock_of
 from towtank.engine.flights import Flights
-from towtank.engine.plan import Clock, Ended, Gauge, Leg, Log, Stat
+from towtank.engine.plan import Ended, Gauge, Leg, Log, Stat
 from towtank.engine.run import ONE, Ensemble, fly
 from towtank.engine.start import at
 from towtank.frames import Array
@@ -21,13 +21,6 @@ from towtank.trials.trajectory import Trajectory
 
 Readings = Mapping[str, tuple[Array, str]]
 """Index name -> (values (N,), unit); NaN where a craft did not get that far."""
-
-TICK = 0.1
-"""Longest control period [s]: what AUV autopilots run at (5 to 20 Hz)."""
-TICKS_PER_LENGTH = 25.0
-"""Fewest control periods in the time in which the craft travels its length."""
-STEP_PER_LAG = 0.35
-"""Longest RK4 step as a share of the shortest lag of the fins, the fastest mode: RK4 follows it to 1e-4 per lag."""
 
 ROLL, PITCH = Gauge("phi", absolute=True), Gauge("theta", absolute=True)
 SPEED = Gauge("speed")
@@ -63,13 +56,6 @@ class Ready:
     start: Array | None = None
     alone: Mapping[str, tuple[float, str]] | None = None
     needs: tuple[str, ...] = ()
-
-
-def clock_of(model: Model, speed: float) -> Clock:
-    """Control period and RK4 steps for a craft at ``speed`` [m/s], from its length and the lag of its fins."""
-    tick = min(TICK, model.craft.length / (speed * TICKS_PER_LENGTH))
-    lag = min((float(fin.time_constant) for fin in model.craft.fins), default=math.inf)
-    return Clock(tick, max(2, math.ceil(tick / (STEP_PER_LAG * lag) - 1e-9)))
 
 
 def fly_ready(
