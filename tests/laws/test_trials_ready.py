@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import synthetic_craft as synthetic
 from towtank.engine.run import Ensemble
-from towtank.errors import TrialError
+from towtank.errors import InputError, TrialError
 from towtank.trials.mission import lawnmower, lawnmower_ready
 from towtank.trials.ready import fly_ready, readings
 from towtank.trials.spiral import spiral, spiral_ready
@@ -153,6 +154,47 @@ def test_a_turn_onto_a_long_leg_may_use_the_time_of_the_whole_leg(stable):
     marks = {m["leg"]: m["time"] for m in trial.provenance["marks"]}
     assert trial.status == "done"
     assert marks["leg 3 coming on"] - marks["leg 2"] > 0.5 * 3.0 * 100.0 / 3.0
+
+
+def _least(model, **given):
+    """The least value that a refusal names for what is ``given`` in craft lengths, in m."""
+    with pytest.raises(InputError, match="turns take up the legs") as refused:
+        lawnmower(model, **{name: f"{share * model.craft.length} m" for name, share in given.items()})
+    words = {"spacing": r"a spacing of ([\d.]+) m", "leg_length": r"legs of ([\d.]+) m"}[next(iter(given))]
+    return float(re.search(words, str(refused.value))[1])
+
+
+@pytest.mark.parametrize("share", [4.0, 4.5, 5.0, 5.7])
+def test_a_spacing_below_what_the_turns_take_is_refused_and_the_one_named_is_flown(stable, share):
+    # The turns of this craft are planned 9.5 lengths wide: half of that before a corner, and a length left over.
+    least = _least(stable, spacing=share)
+    assert least == pytest.approx((0.5 * 9.497 + 1.0) * 8.15, abs=0.1)
+    trial = lawnmower(stable, 3, spacing=f"{least} m")
+    assert trial.status == "done"
+    marks = [m for m in trial.provenance["marks"] if m["leg"] in ("leg 2", "leg 4")]
+    assert [m["ended"] for m in marks] == ["event", "event"]
+    # On a short leg the craft goes east all the time, and ends it a length beyond the long one.
+    ends = {m["leg"]: m["time"] for m in trial.provenance["marks"]}
+    on = (trial.time >= ends["leg 1"]) & (trial.time <= ends["leg 2"])
+    assert np.all(np.diff(trial.position[on, 1]) > -0.01)
+    assert np.interp(ends["leg 2"], trial.time, trial.position[:, 1]) == pytest.approx(8.15, abs=0.1)
+
+
+@pytest.mark.parametrize("share", [8.0, 10.0, 11.4])
+def test_a_long_leg_without_a_rest_after_its_half_is_refused_and_the_one_named_is_flown(stable, share):
+    least = _least(stable, leg_length=share)
+    assert least == pytest.approx(2.0 * (0.5 * 9.497 + 1.0) * 8.15, abs=0.1)
+    trial = lawnmower(stable, 3, f"{least} m")
+    assert trial.status == "done"
+    assert all(np.isfinite(value) for value, _ in trial.indices.values())
+
+
+def test_a_craft_that_turns_tightly_flies_the_shortest_pattern_and_one_leg_has_no_turn(stable):
+    tight = synthetic.model(synthetic.SUBOFF)
+    assert _least(tight, spacing=3.9) == pytest.approx(4.0 * 8.15, abs=0.01)
+    assert _least(tight, leg_length=7.9) == pytest.approx(8.0 * 8.15, abs=0.01)
+    assert len(lawnmower_ready(tight, 3, "65.2 m", "32.6 m").legs) == 8
+    assert len(lawnmower_ready(stable, 1, spacing="5 m").legs) == 2
 
 
 def test_a_lawnmower_that_loses_its_track_names_the_leg(stable):

@@ -37,8 +37,8 @@ PATIENCE = 3.0
 rest of the leg has its own share beside that."""
 SETTLED = 0.5
 """Share of a long leg after which the craft should have come onto it."""
-HELD = 1.0
-"""Lengths for which a line is held, at the least, before the turn onto the next begins."""
+LEFT = 1.0
+"""Least length of a line, in craft lengths, that the turn at its end leaves over."""
 
 _ACROSS, _DEEP = Gauge("across", absolute=True), Gauge("z")
 
@@ -109,10 +109,16 @@ def lawnmower_ready(
 def _room(legs: int, long_: float, short: float, length: float, early: float) -> None:
     """Refuse lines [m] that a craft of ``length`` [m] cannot fly when it turns ``early`` [m] before their ends.
 
-    A short line is held for ``HELD`` lengths before the next turn; so is a long one after the part in which the craft
-    comes onto it, since its numbers are of that rest. Nothing is known of the spacing of a single leg.
+    ``LEFT`` lengths of a short line are left before the next turn begins, or the craft would have to come back to end
+    it; as much of a long one beyond the part in which the craft comes onto it, since the indices are of that rest. A
+    single leg has no spacing.
+
+    Raises
+    ------
+    InputError
+        Too short, or no legs; the least of each for this craft is named.
     """
-    need = early + HELD * length
+    need = early + LEFT * length
     least_long, least_short = max(8.0 * length, need / (1.0 - SETTLED)), max(4.0 * length, need)
     slack = 1.0 - 1e-9
     if legs < 1 or long_ < least_long * slack or (legs > 1 and short < least_short * slack):
