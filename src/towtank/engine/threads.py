@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import math
 import threading
@@ -57,14 +58,13 @@ def run_threads(compiled: Library, arrays: Arrays, progress: Progress, threads: 
     workers = [threading.Thread(target=work, daemon=True) for _ in range(min(shared, len(firsts)))]
     progress.start("trajectories", len(firsts))
     try:
-        for worker in workers:
-            worker.start()
-        for _ in firsts:
-            if error := done.get():
-                raise error
-            progress.step("trajectories")
-    except KeyboardInterrupt:
-        pass
+        with contextlib.suppress(KeyboardInterrupt):
+            for worker in workers:
+                worker.start()
+            for _ in firsts:
+                if error := done.get():
+                    raise error
+                progress.step("trajectories")
     finally:
         stop.value = 1
         for worker in workers:
