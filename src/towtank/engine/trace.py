@@ -107,7 +107,8 @@ def slopes_header(trace: Traced) -> str:
     both = ca.vertcat(asked, remembered)
     functions = [
         ("dynamics_vjp", [v.p, v.x, v.asked, bar["x"]],
-         [ca.gradient(moved, v.x), ca.gradient(moved, v.asked), known(ca.gradient(shifted, theta))]),
+         [ca.densify(out) for out in (ca.gradient(moved, v.x), ca.gradient(moved, v.asked),
+                                      known(ca.gradient(shifted, theta)))]),
         ("observe_vjp", [v.p, v.x, v.orders, bar["seen"]], [ca.gradient(watched, x) for x in (v.x, theta)]),
         ("steer_vjp", [v.p, v.seen, v.memory, v.orders, bar["asked"], bar["memory"]],
          [ca.gradient(steered, x) for x in (v.seen, v.memory, theta)]),
@@ -119,7 +120,9 @@ def slopes_header(trace: Traced) -> str:
     ]  # fmt: skip
     lines = [f"/* {form.word} */", f"#define FREE {free}"]
     for name, inputs, outputs in functions:
-        function = ca.Function(name, inputs, ca.cse([ca.sparsify(out) for out in outputs]))
+        function = ca.Function(
+            name, inputs, ca.cse([out if name == "dynamics_vjp" else ca.sparsify(out) for out in outputs])
+        )
         lines.append(c_function(function)[0])
         lines += [c_pattern(f"{name}{i}", function.sparsity_out(i)) for i in range(function.n_out())]
     return "\n".join([*lines, ""])

@@ -52,16 +52,16 @@ INLINE void step(const double *p, const double *x, const double *asked, double d
   }
 }
 
-/* Forward: states of every step (ticks * steps + 1, NX), memories (ticks + 1, NM), commands (ticks, NF). */
+/* Forward: the four points of every step and the last state (4 * ticks * steps + 1, NX), memories (ticks + 1, NM), commands (ticks, NF). */
 static void forward(const Slope *a, double *X, double *M, double *U) {
-  double dt = a->tick / (double)a->steps, at[4][NX], rates[NM], y[NY];
+  double dt = a->tick / (double)a->steps, rates[NM], y[NY];
   memcpy(X, a->start, NX * sizeof(double));
   memcpy(M, a->start + NX, NM * sizeof(double));
   for (int64_t k = 0; k < a->ticks; k++) {
     const double *ref = a->orders + a->row[k] * NO;
     guide(a->p, X, M + k * NM, ref, U + k * NF, rates);
     for (int i = 0; i < NM; i++) M[(k + 1) * NM + i] = M[k * NM + i] + a->tick * rates[i];
-    for (int64_t s = 0; s < a->steps; s++, X += NX) step(a->p, X, U + k * NF, dt, at, X + NX);
+    for (int64_t s = 0; s < a->steps; s++, X += 4 * NX) step(a->p, X, U + k * NF, dt, (double(*)[NX])X, X + 4 * NX);
     observe(a->p, X, ref, y);
     for (int64_t c = 0; c < a->channels; c++) a->seen[k * a->channels + c] = y[a->channel[c]];
   }
@@ -78,14 +78,14 @@ static void look_back(const double *p, const double *x, const double *ref, const
 /* Misfit and its gradient by the discrete adjoint of the loop. Returns 0, or 1 without memory. */
 __attribute__((visibility("default"))) int misfit(const Slope *a) {
   int64_t n = a->ticks * a->steps;
-  double *X = malloc(((n + 1) * NX + (a->ticks + 1) * NM + a->ticks * NF) * sizeof(double));
+  double *X = malloc(((4 * n + 1) * NX + (a->ticks + 1) * NM + a->ticks * NF) * sizeof(double));
   if (!X) return 1;
-  double *M = X + (n + 1) * NX, *U = M + (a->ticks + 1) * NM, dt = a->tick / (double)a->steps, total = 0.0;
+  double *M = X + (4 * n + 1) * NX, *U = M + (a->ticks + 1) * NM, dt = a->tick / (double)a->steps, total = 0.0;
   double lx[NX] = {0}, lm[NM] = {0}, theta[FREE] = {0};
   forward(a, X, M, U);
   for (int64_t k = a->ticks - 1; k >= 0; k--) {
     const double *ref = a->orders + a->row[k] * NO;
-    double ly[NS] = {0}, la[NF] = {0}, xb[NX], ab[NF], mb[NM], tb[FREE], back[NM];
+    double ly[NS] = {0}, la[NF] = {0}, ab[NF], mb[NM], tb[FREE], back[NM];
     for (int64_t c = 0; c < a->channels; c++) {
       double e = a->seen[k * a->channels + c] - a->measured[k * a->channels + c], w = a->weight[k * a->channels + c];
       if (a->channel[c] == PSI) e = wrapped(e);
@@ -93,32 +93,30 @@ __attribute__((visibility("default"))) int misfit(const Slope *a) {
       total += w * e * e;
       ly[a->channel[c]] += 2.0 * w * e;
     }
-    look_back(a->p, X + (k + 1) * a->steps * NX, ref, ly, lx, theta);
+    look_back(a->p, X + (k + 1) * a->steps * 4 * NX, ref, ly, lx, theta);
     for (int64_t s = a->steps - 1; s >= 0; s--) {
-      double at[4][NX], next[NX], l[NX], yb[NX] = {0};
-      step(a->p, X + (k * a->steps + s) * NX, U + k * NF, dt, at, next);
-      double sum[NX];
+      const double *at = X + (k * a->steps + s) * 4 * NX;
+      double l[NX], yb[NX] = {0}, sum[NX];
       memcpy(sum, lx, sizeof sum);
 #pragma GCC unroll 1
       for (int g = 3; g >= 0; g--) {
         double share = SHARE[g] * dt, on = g < 3 ? TO[g + 1] * dt : 0.0;
-        for (int i = 0; i < NX; i++) { l[i] = share * lx[i] + on * yb[i]; yb[i] = 0.0; }
-        dynamics_vjp(a->p, at[g], U + k * NF, l, xb, ab, tb);
-        for (int j = 0; j < dynamics_vjp0_col[1]; j++) yb[dynamics_vjp0_row[j]] = xb[j];
-        for (int j = 0; j < dynamics_vjp1_col[1]; j++) la[dynamics_vjp1_row[j]] += ab[j];
-        for (int j = 0; j < dynamics_vjp2_col[1]; j++) theta[dynamics_vjp2_row[j]] += tb[j];
+        for (int i = 0; i < NX; i++) l[i] = share * lx[i] + on * yb[i];
+        dynamics_vjp(a->p, at + g * NX, U + k * NF, l, yb, ab, tb);
+        for (int i = 0; i < NF; i++) la[i] += ab[i];
+        for (int i = 0; i < FREE; i++) theta[i] += tb[i];
         for (int i = 0; i < NX; i++) sum[i] += yb[i];
       }
       memcpy(lx, sum, sizeof sum);
     }
     for (int i = 0; i < NM; i++) back[i] = a->tick * lm[i];
     double seen[NY], yb[NS], none[NS] = {0};
-    observe(a->p, X + k * a->steps * NX, ref, seen);
+    observe(a->p, X + k * a->steps * 4 * NX, ref, seen);
     steer_vjp(a->p, seen, M + k * NM, ref, la, back, yb, mb, tb);
     for (int j = 0; j < steer_vjp0_col[1]; j++) none[steer_vjp0_row[j]] = yb[j];
     for (int j = 0; j < steer_vjp1_col[1]; j++) lm[steer_vjp1_row[j]] += mb[j];
     for (int j = 0; j < steer_vjp2_col[1]; j++) theta[steer_vjp2_row[j]] += tb[j];
-    look_back(a->p, X + k * a->steps * NX, ref, none, lx, theta);
+    look_back(a->p, X + k * a->steps * 4 * NX, ref, none, lx, theta);
   }
   *a->misfit = total;
   memcpy(a->gradient, theta, sizeof theta);
