@@ -34,7 +34,7 @@ $(VENV)/.installed: pyproject.toml .ci/venv.sh
 
 # The installation compiles the engine; it is compiled again after its sources changed.
 $(VENV)/.engine: $(ENGINE) | $(VENV)/.installed
-	[ -z "$$(find $(ENGINE) -newer $(VENV)/.installed)" ] || $(BIN)/python -m pip install --quiet --no-deps --editable .
+	@[ -z "$$(find $(ENGINE) -newer $(VENV)/.installed)" ] || $(BIN)/python -m pip install --quiet --no-deps --editable .
 	@touch $@
 
 $(VENV)/.tools: $(VENV)/.installed
