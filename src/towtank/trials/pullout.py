@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from towtank.engine.flights import Flights
@@ -106,7 +108,7 @@ def _decay(flights: Flights, i: int, begin: float, end: float, rate: float, resi
     inside = (flights.time > begin) & (flights.time <= end)
     time = np.concatenate([[begin], flights.time[inside]])
     rates = np.concatenate([[rate], flights.series("turn")[i, inside]])
-    excess = np.abs(rates - residual) - abs(rate - residual) / np.e
+    excess = np.abs(rates - residual) - abs(rate - residual) / math.e
     below = np.flatnonzero(excess < 0.0)
     if not len(below):
         return float("nan")
