@@ -87,8 +87,8 @@ def test_no_fin_is_asked_beyond_its_limit_and_yaw_and_pitch_keep_their_ratio(rud
     fins = allocation(synthetic.craft())
     order = RUDDER_FIRST if first else YAW_AND_PITCH_FIRST
     granted = share((rudder, elevator, aileron), fins.rows, fins.limits, order, MATH)
-    # A demand up to ROUND_OFF is granted on top of a full fin; the sums add a few units in the last place.
-    assert max(abs(a) for a in fins.fins(granted)) <= np.radians(25.0) + ROUND_OFF + 4.0 * np.spacing(0.5)
+    # A demand up to ROUND_OFF is granted on top of a full fin in each of the two later stages.
+    assert max(abs(a) for a in fins.fins(granted)) <= np.radians(25.0) + 2.0 * ROUND_OFF + 4.0 * np.spacing(0.5)
     if not first:
         assert granted[0] * elevator == pytest.approx(granted[1] * rudder, abs=1e-12)
     else:
@@ -287,8 +287,10 @@ PRIORITY = st.sampled_from([RUDDER_FIRST, ELEVATOR_FIRST, YAW_AND_PITCH_FIRST])
 @given(COMMANDS, TAILS, PRIORITY)
 def test_what_is_granted_stays_within_every_fin_and_keeps_its_direction(command, fins, first):
     granted = share(command, fins.rows, fins.limits, first, MATH)
-    # A fin that its group hardly moves, by entries of the mixing such as 6e-17, does not count as limited.
-    assert all(abs(a) <= limit + ROUND_OFF for a, limit in zip(fins.fins(granted), fins.limits, strict=True))
+    # A fin that its group hardly moves, by entries of the mixing such as 6e-17, does not count as limited, in either of
+    # the two later stages; the sums add a few units in the last place.
+    beyond = 2.0 * ROUND_OFF + 4.0 * np.spacing(1.0)
+    assert all(abs(a) <= limit + beyond for a, limit in zip(fins.fins(granted), fins.limits, strict=True))
     assert all(got * want >= 0.0 and abs(got) <= abs(want) for got, want in zip(granted, command, strict=True))
     if first == YAW_AND_PITCH_FIRST:
         assert granted[0] * command[1] == pytest.approx(granted[1] * command[0], abs=1e-15)

@@ -17,7 +17,8 @@ ELEVATOR_FIRST: First = (0.0, 1.0)
 
 ROUND_OFF = 1e-12
 """Angle [rad] below which a fin is not moved. The mixing of a fin at 90 deg holds entries such as 6e-17, and sums of
-columns are off by some 1e-16 rad; neither may count as a demand. A limit may be passed by as much."""
+columns are off by some 1e-16 rad; neither may count as a demand. Each of the two later stages may
+pass a limit by as much."""
 
 
 @dataclass(frozen=True)
