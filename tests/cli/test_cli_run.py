@@ -140,3 +140,19 @@ def test_the_report_stands_alone(first: tuple[Path, dict, str]):
     assert "semi-empirical" in page
     assert 'src="http' not in page
     assert 'href="http' not in page or "<link" not in page
+
+
+def test_without_a_compiled_engine_the_run_goes_on_and_says_what_it_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TOWTANK_ENGINE", "numpy")
+    result = runner.invoke(app, ["run", "spheroid-6-1", "--json"])
+    assert result.exit_code == 0, result.stderr
+    assert "left out" in result.stderr
+    assert "towtank doctor" in result.stderr
+    assert (
+        json.loads((tmp_path / "spheroid-6-1" / "trials" / "index.json").read_text())["trials"][0]["name"] == "straight"
+    )
+    assert not (tmp_path / "spheroid-6-1" / "mc.json").exists()
+    assert (tmp_path / "spheroid-6-1" / "report.html").stat().st_size > 10_000

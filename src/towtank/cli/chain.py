@@ -300,6 +300,13 @@ class Chain:
         known = self.study.stages().get("mc", {}).get("inputs", {})
         return self.drawing or {name: known.get(name, usual) for name, usual in DRAWING.items()}
 
+    def compiled(self) -> bool:
+        """True where the model flies on a compiled library, so that many craft cost little."""
+        from towtank.engine.form import form_of
+        from towtank.engine.library import library
+
+        return library(form_of(self.model())) is not None
+
     def scatter(self, where: str | None = None, workers: int = 1, settings: Mapping[str, Any] | None = None) -> None:
         """The trials of craft drawn from the uncertainty of the derivatives; see ``towtank.montecarlo``.
 

@@ -8,12 +8,15 @@ from towtank.cli.reply import answering
 from towtank.parallel import cores, prepare
 
 PRELOADED = (
-    "towtank.trials.standard",
     "towtank.report.build",
     "matplotlib.figure",
     "matplotlib.backends.backend_svg",
 )
 """What the processes of later stages need, imported while the first stages run."""
+UNCOMPILED = (
+    "without its compiled engine it takes many minutes. `towtank doctor` says why there is none; `towtank mc` does it "
+    "all the same"
+)
 
 
 def run(
@@ -28,19 +31,17 @@ def run(
     """
     with answering("run", json, debug) as reply:
         if cores() > 1:
-            prepare(
-                "towtank.trials.standard",
-                "towtank.report.build",
-                "matplotlib.figure",
-                "matplotlib.backends.backend_svg",
-            )
+            prepare(*PRELOADED)
         chain = open_chain(reply, craft, out, speed)
         chain.prepare()
         chain.make_plan()
         chain.tow()
         chain.derive()
         chain.try_out()
-        chain.scatter()
+        if chain.done("mc") or chain.compiled():
+            chain.scatter()
+        else:
+            reply.log(f"mc       left out: {UNCOMPILED}")
         chain.judge()
         chain.publish()
         verdict = chain.verdict()
