@@ -30,7 +30,8 @@ def run(folder: Path, work: Any = cases.square, items: list[int] = ITEMS, **opti
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     """A real scheduler with two worker processes under nannies."""
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": ":0"}
     with distributed.LocalCluster(**options, silence_logs=50) as made:
         yield made
@@ -177,14 +178,14 @@ def test_without_dask_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    pytest.importorskip("distributed")
     monkeypatch.setattr("towtank.cluster.dask.PATIENCE", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         run(tmp_path, where="tcp://127.0.0.1:9")
 
 
 def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     monkeypatch.setattr("towtank.cluster.dask.PATIENCE", "1s")
     empty = distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50)
     with empty, pytest.raises(InputError, match="has no workers"):
@@ -201,7 +202,8 @@ def test_a_cluster_with_another_version_is_refused_before_any_work(
 
 
 def test_a_scheduler_that_goes_away_is_told_and_what_is_finished_stays(tmp_path: Path):
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     short_lived = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs=50)
     answers = each_once(
         cases.square,

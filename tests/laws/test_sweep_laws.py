@@ -338,7 +338,8 @@ def test_contours_pass_through_the_points_and_trials_out_of_trim_are_left_out(cr
 
 
 def test_a_dask_cluster_gives_what_this_machine_gives(swept: tuple[Sweep, Path, SweepTable], tmp_path: Path):
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     sweep, _, table = swept
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
     with distributed.LocalCluster(**options) as cluster:

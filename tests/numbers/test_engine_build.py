@@ -29,7 +29,7 @@ from towtank.model.extra import ExtraLoad
 from towtank.pilot.design import design_pilot
 from towtank.pilot.orders import Orders
 
-pytestmark = pytest.mark.skipif(not lib.can_compile(), reason="needs CasADi and a C compiler")
+assert lib.can_compile(), "these tests need CasADi and a C compiler"
 
 COMPILER = """#!/bin/sh
 echo call >> {calls}
@@ -299,9 +299,8 @@ def test_a_failing_compiler_or_cache_is_warned_of_once_and_numpy_is_used(
 
 
 def test_a_compiler_that_does_not_know_the_best_target_compiles_the_next(calls, monkeypatch):
-    if len(wanted()) < 2:
-        pytest.skip("one target")
-    first, second = wanted()[:2]
+    # The last target is one that every machine of this kind can run; the best is made to fail.
+    first, second = build.targets()[0], build.targets()[-1]
     monkeypatch.setattr(lib, "able", lambda: (replace(first, flags=("-march=abacus",)), second))
     with pytest.warns(EngineWarning, match=f"abacus(.|\n)* runs on {second.name} instead"):
         assert library(SHIPPED[0]).target == second
