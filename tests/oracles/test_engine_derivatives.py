@@ -37,7 +37,7 @@ SEEN = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r", "del
 KINKS = ("max_angle", "max_rate", "mixing", "unmixing")
 """Where several fins reach a limit together, round-off says which of them binds: only the sum over them is definite."""
 
-compiled = pytest.mark.skipif(library(form_of(model("lumped"))) is None, reason="no library and no compiler here")
+assert library(form_of(model("lumped"))) is not None, "these tests need a compiled engine"
 
 
 def noise(shape, seed=1):
@@ -89,7 +89,6 @@ def within(craft, along, wanted_at, names, given):
     return good
 
 
-@compiled
 @pytest.mark.parametrize("name", CASES)
 def test_tangents_are_the_differences_of_runs_for_every_parameter(name):
     """All parameters of the form; the mass, CG, inertia and added mass move the inverse, which the runs take again."""
@@ -104,7 +103,6 @@ def test_tangents_are_the_differences_of_runs_for_every_parameter(name):
     assert all(moves[0, names.index(each)] > 0.0 for each in MASS if each not in ("xB", "yB", "g", "b"))
 
 
-@compiled
 def test_fins_at_their_limits_share_a_slope_that_only_their_sum_shows():
     craft, begin, _, given = run_of("lumped")
     flown = [Leg("turn", replace(legs()[1].orders, heading=1.4, depth=6.0), 6.0)]
@@ -126,7 +124,6 @@ def test_fins_at_their_limits_share_a_slope_that_only_their_sum_shows():
         assert a == pytest.approx(b, rel=1e-9)
 
 
-@compiled
 @pytest.mark.parametrize("name", CASES)
 def test_the_adjoint_is_the_sum_of_the_tangents(name):
     craft, begin, record, given = run_of(name)
@@ -149,7 +146,6 @@ def test_the_adjoint_is_the_sum_of_the_tangents(name):
     np.testing.assert_allclose(found.seen, along.seen, rtol=0, atol=1e-13)
 
 
-@compiled
 @pytest.mark.parametrize("name", ["lumped", "three fins"])
 def test_the_gradient_to_the_start_is_the_difference_of_misfits(name):
     craft, begin, record, given = run_of(name)
@@ -168,7 +164,6 @@ def test_the_gradient_to_the_start_is_the_difference_of_misfits(name):
         assert found.start_gradient[i] == pytest.approx(wanted, rel=1e-7, abs=1e-9 * found.value / 1e-4), i
 
 
-@compiled
 @pytest.mark.parametrize("name", CASES)
 def test_a_run_under_a_record_is_the_run_of_fly(name):
     """Headings past half a turn, a current, three legs."""
@@ -217,7 +212,6 @@ def casadi_misfit(craft, begin, record, given, places, measured, weight):
     return [np.array(part).ravel() for part in value(base, begin)]
 
 
-@compiled
 @pytest.mark.parametrize("name", ["lumped", "split", "screw"])
 def test_the_gradient_is_the_one_casadi_takes_of_the_same_loop(name):
     craft, begin, _, given = run_of(name)
@@ -248,7 +242,6 @@ def points(craft, count=4):
     return x, x[:, 13:] + rng.uniform(-0.3, 0.3, (count, fins))
 
 
-@compiled
 @pytest.mark.parametrize("name", CASES)
 def test_jacobians_are_those_of_dual_numbers_and_of_casadi(name, monkeypatch):
     craft = model(name)
@@ -274,7 +267,6 @@ def test_jacobians_are_those_of_dual_numbers_and_of_casadi(name, monkeypatch):
         np.testing.assert_allclose(found.B[i], B, rtol=1e-10, atol=1e-12)
 
 
-@compiled
 def test_jacobians_are_differences_of_rates_and_one_point_is_a_row():
     craft = model("lumped")
     x, asked = points(craft)
@@ -287,7 +279,6 @@ def test_jacobians_are_differences_of_rates_and_one_point_is_a_row():
     np.testing.assert_array_equal(one.G[0], found.G[2])
 
 
-@compiled
 @pytest.mark.parametrize("name", CASES)
 def test_the_linear_model_is_the_one_of_dual_numbers(name):
     craft = model(name)
@@ -311,7 +302,6 @@ def test_the_linear_model_is_the_one_of_dual_numbers(name):
         linear_at(craft, [0.0] * 4 + [1.6] + [0.0] * (7 + len(fins)), 35.0)
 
 
-@compiled
 @pytest.mark.parametrize("straightened", [{"kappa_v": 0.3, "kappa_r": 0.2}, {"axisymmetric_crossflow": True}])
 def test_options_of_the_model_have_their_slopes_too(straightened):
     plain = model("three fins")
@@ -322,7 +312,6 @@ def test_options_of_the_model_have_their_slopes_too(straightened):
     np.testing.assert_allclose(found.A, wanted.A, rtol=1e-10, atol=1e-13 * np.abs(wanted.A).max())
 
 
-@compiled
 @pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (0.0, 0.5 * np.pi, 0.0)])
 def test_a_craft_at_rest_and_one_standing_upright_have_finite_slopes(attitude):
     craft = model("lumped")
