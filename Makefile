@@ -11,7 +11,7 @@ OUT    ?= hokie
 ENGINE := hatch_build.py $(wildcard src/towtank/symbols.py src/towtank/engine/*.py src/towtank/engine/c/* \
             src/towtank/model/*.py src/towtank/pilot/*.py)
 
-.PHONY: help install run test lint bench bench-engine validate clean
+.PHONY: help install run test lint bench bench-engine validate validate-slurm clean
 .DEFAULT_GOAL := help
 
 help:
@@ -20,6 +20,7 @@ help:
 	@echo "make test      ruff, mypy, import-linter, pytest"
 	@echo "make lint      the first three of these"
 	@echo "make validate  the longer checks; rewrites the validation table of the report"
+	@echo "make validate-slurm  work shared by jobs of a real one-node Slurm; as root, with Debian's Slurm installed"
 	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
 	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
 	@echo "make clean     remove $(VENV)/, caches and bench/"
@@ -51,11 +52,14 @@ lint: $(VENV)/.tools
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/pytest -m "not validate" -n $(JOBS) --dist loadfile
+	$(BIN)/pytest -m "not validate and not slurm" -n $(JOBS) --dist loadfile
 
 validate: $(VENV)/.tools
 	$(BIN)/python validation/suboff.py
 	$(BIN)/pytest -m validate
+
+validate-slurm: $(VENV)/.engine $(VENV)/.tools
+	$(BIN)/pytest -m slurm
 
 bench: $(VENV)/.engine
 	$(BIN)/python benchmarks/bench.py

@@ -1,5 +1,5 @@
 #!/bin/sh
-# One-node Slurm on this machine, for the tests marked validate. Debian: apt-get install slurmctld slurmd slurm-client munge
+# One-node Slurm on this machine, for make validate-slurm. Debian: apt-get install slurmctld slurmd slurm-client munge
 # Usage, as root: sh slurm_loopback.sh start|stop FOLDER. Then: export SLURM_CONF=FOLDER/slurm.conf
 set -eu
 action=$1

@@ -40,8 +40,9 @@ def _settings(folder: Path) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def slurm() -> Iterator[Path]:
-    if not all(shutil.which(name) for name in ("slurmctld", "slurmd", "sbatch", "munged")) or os.geteuid() != 0:
-        pytest.skip("no Slurm daemons here, or not root")
+    absent = [name for name in ("slurmctld", "slurmd", "sbatch", "munged") if not shutil.which(name)]
+    assert not absent, f"not installed: {absent}. apt-get install slurmctld slurmd slurm-client munge"
+    assert os.geteuid() == 0, "the daemons of a one-node Slurm need root"
     # The daemons write a last line to their logs while they end.
     with (
         tempfile.TemporaryDirectory(prefix="slurm-", ignore_cleanup_errors=True) as folder,
@@ -61,7 +62,7 @@ def _jobs() -> list[str]:
     return subprocess.run(["squeue", "-h", "-o", "%i"], capture_output=True, text=True, check=True).stdout.split()
 
 
-@pytest.mark.validate
+@pytest.mark.slurm
 def test_jobs_of_slurm_share_the_work_and_cancelled_jobs_are_replaced(slurm: Path, tmp_path: Path):
     found: dict[int, Any] = {}
     options: dict[str, Any] = {
@@ -89,7 +90,7 @@ def test_jobs_of_slurm_share_the_work_and_cancelled_jobs_are_replaced(slurm: Pat
     assert _jobs() == [], "the jobs outlive the work"
 
 
-@pytest.mark.validate
+@pytest.mark.slurm
 def test_settings_that_slurm_does_not_take_are_refused(slurm: Path, tmp_path: Path):
     with pytest.raises(InputError, match=r"arguments of dask_jobqueue\.SLURMCluster"):
         list(

@@ -16,7 +16,7 @@ from towtank.artefact import json_text, read_json, write_json
 from towtank.errors import ArtefactError, InputError
 from towtank.provenance import provenance
 
-SCHEMA, MARK = "towtank/work/1", "towtank/ledger/1"
+SCHEMA, MARK = "towtank/result/1", "towtank/ledger/1"
 _KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
