@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from towtank.derive.covariance import root_of
 from towtank.errors import InputError
 from towtank.frames import Array, rotation
 from towtank.model.equations import Model
@@ -83,12 +84,6 @@ class Drawn:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
-
-
-def root_of(covariance: Array) -> Array:
-    """A matrix (n, n) whose product with its transpose is ``covariance``; eigenvalues below zero are round-off."""
-    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def draw(

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from towtank.derive.covariance import root_of
 from towtank.errors import InputError, TrialError
 from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.montecarlo.draw import NONE, Tolerances, draw, root_of
+from towtank.montecarlo.draw import NONE, Tolerances, draw
 from towtank.montecarlo.fly import (
     Piece,
     Recipe,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from towtank.derive.covariance import root_of
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
@@ -57,9 +58,7 @@ def samples(model: Model, count: int = SAMPLES, slopes: str = "origin", seed: in
     d = to_variant(model.derivatives, "lumped")
     if slopes == "origin" and not d.origin:
         raise InputError(f"the derivatives of {d.craft} hold no slopes at the origin. Use slopes='wide'.")
-    drawn = np.random.default_rng(seed).multivariate_normal(
-        np.zeros(len(d.names)), d.covariance, size=count, method="eigh", check_valid="ignore"
-    )
+    drawn = np.random.default_rng(seed).standard_normal((count, len(d.names))) @ root_of(d.covariance).T
     drawn = np.vstack([np.zeros(len(d.names)), drawn])
     out = {name: d.values[i] + drawn[:, i] for i, name in enumerate(d.names)}
     if slopes == "origin":
