@@ -1,0 +1,1 @@
+"""Mesh-resolution study: the same runs on three or more meshes."""
