@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from towtank.cli.app import app
 from towtank.cli.chain import open_chain
 from towtank.cli.reply import Reply
+from towtank.cli.scatter import asked
 from towtank.montecarlo import study
 from towtank.montecarlo.fly import Piece, Study
 
@@ -106,7 +107,7 @@ def test_the_trials_get_their_std_and_stay_done(flown: Path, tmp_path: Path):
     assert _circle(folder)["advance"]["std"] == expected
     again = open_chain(Reply("run"), None, folder)
     assert again.done("mc")
-    assert again.asked()["samples"] == "15"
+    assert asked(again)["samples"] == "15"
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from towtank.cli.reply import Remarks, Reply
+from towtank.cli.scatter import asked, spread
 from towtank.cli.study import Study, file_hash, program_hash
 from towtank.errors import ArtefactError, CraftError, InputError
 from towtank.parallel import cores
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     from towtank.trials.trajectory import Trajectory
 
 STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "verdict", "report")
-DRAWING = {"samples": "500", "mass": "0", "cg": "0", "current": "0", "seed": "20"}
-"""Monte Carlo study of a study that was asked for no other: the uncertainty of the derivatives alone."""
 
 
 def open_chain(reply: Reply, craft: str | None, out: Path | None, speed: str | None = None) -> Chain:
@@ -69,7 +68,7 @@ def _at_speed(craft: Craft, speed: str | None) -> Craft:
 class Chain:
     """One study under way. ``speed`` as the user wrote it; None is the craft's own.
 
-    drawing : what the user asked of the Monte Carlo study, as in ``DRAWING``; None is what the study has, or that.
+    drawing : what the user asked of the Monte Carlo study, as in ``cli.scatter.DRAWING``; None: what the study has.
     """
 
     study: Study
@@ -111,7 +110,7 @@ class Chain:
             case "trials":
                 return craft | {"derivatives": file_hash(study.derivatives)}
             case "mc":
-                return craft | {"derivatives": file_hash(study.derivatives)} | self.asked()
+                return craft | {"derivatives": file_hash(study.derivatives)} | asked(self)
             case "verdict":
                 # The index of the trials holds what the verdict does not use: the spread of the indices.
                 flown = self.study.stages().get("trials", {}).get("files", {})
@@ -124,7 +123,8 @@ class Chain:
         """True when ``stage`` need not be done again."""
         return self.study.current(stage, self.inputs(stage))
 
-    def _do(self, stage: str, work: Callable[[], Sequence[Path]]) -> None:
+    def do(self, stage: str, work: Callable[[], Sequence[Path]]) -> None:
+        """Do ``work`` for ``stage``, which gives the files it wrote, unless it is done; record it."""
         if self.done(stage):
             self.reply.log(f"{stage:<8} already done")
             return
@@ -144,7 +144,7 @@ class Chain:
 
     def prepare(self) -> None:
         """Put the craft file and its solid into the study folder."""
-        self._do("craft", self._write_craft)
+        self.do("craft", self._write_craft)
         self.reply.file("craft", self.study.craft)
 
     def _write_craft(self) -> Sequence[Path]:
@@ -181,7 +181,7 @@ class Chain:
             self.plan()
             self.reply.log(f"plan     edited by hand, used as it is (remove {self.study.plan} for the standard one)")
         else:
-            self._do("plan", self._write_plan)
+            self.do("plan", self._write_plan)
         self.reply.file("plan", self.study.plan)
 
     def _write_plan(self) -> Sequence[Path]:
@@ -203,7 +203,7 @@ class Chain:
     def tow(self) -> None:
         """Run the captive tests that are not done yet."""
         self.reply.kept = f"Finished runs are kept in {self.study.runs}."
-        self._do("tow", self._tow)
+        self.do("tow", self._tow)
         self.reply.file("runs", self.study.runs)
         self.reply.kept = f"What is done is kept in {self.study.root}."
 
@@ -231,7 +231,7 @@ class Chain:
 
     def derive(self) -> None:
         """Derivatives and model from the runs."""
-        self._do("derive", self._derive)
+        self.do("derive", self._derive)
         self.reply.file("derivatives", self.study.derivatives)
         self.reply.file("model", self.study.model)
 
@@ -266,7 +266,7 @@ class Chain:
 
     def try_out(self) -> None:
         """The standard trials."""
-        self._do("trials", self._trials)
+        self.do("trials", self._trials)
         self.reply.file("trials", self.study.trials)
 
     def _trials(self) -> Sequence[Path]:
@@ -286,7 +286,7 @@ class Chain:
 
         names = {item.name for item in trajectories}
         everything = (*trajectories, *(item for item in self.trajectories() if item.name not in names))
-        index = write_index(everything, self.study.trials, self._spread(everything))
+        index = write_index(everything, self.study.trials, spread(self, everything))
         return [index, *(self.study.trials / f"{item.name}.nc" for item in everything)]
 
     def trajectories(self) -> tuple[Trajectory, ...]:
@@ -295,62 +295,9 @@ class Chain:
 
         return tuple(read_trajectory(path) for path in sorted(self.study.trials.glob("*.nc")))
 
-    def asked(self) -> dict[str, str]:
-        """What is asked of the Monte Carlo study: by the user now, by the record of the study, or ``DRAWING``."""
-        known = self.study.stages().get("mc", {}).get("inputs", {})
-        return self.drawing or {name: known.get(name, usual) for name, usual in DRAWING.items()}
-
-    def compiled(self) -> bool:
-        """True where the model flies on a compiled library, so that many craft cost little."""
-        from towtank.engine.form import form_of
-        from towtank.engine.library import library
-
-        return library(form_of(self.model())) is not None
-
-    def scatter(self, where: str | None = None, workers: int = 1, settings: Mapping[str, Any] | None = None) -> None:
-        """The trials of craft drawn from the uncertainty of the derivatives; see ``towtank.montecarlo``.
-
-        A study of more samples that is out of date is done again with the usual number, unless it is asked for now.
-        """
-        if self.drawing is None and not self.done("mc"):
-            samples = min(int(self.asked()["samples"]), int(DRAWING["samples"]))
-            self.drawing = self.asked() | {"samples": str(samples)}
-        self._do("mc", lambda: self._scatter(where, workers, settings or {}))
-        self.reply.file("mc", self.study.mc)
-
-    def _scatter(self, where: str | None, workers: int, settings: Mapping[str, Any]) -> Sequence[Path]:
-        from towtank.montecarlo.draw import tolerances
-        from towtank.montecarlo.files import FOLDER, write_mc, write_std
-        from towtank.montecarlo.study import monte_carlo
-
-        asked, pieces = self.asked(), self.study.root / FOLDER / "pieces"
-        self.reply.kept = f"Finished pieces are kept in {pieces}."
-        found = monte_carlo(
-            self.model(), int(asked["samples"]), given=tolerances(asked["mass"], asked["cg"], asked["current"]),
-            seed=int(asked["seed"]), progress=self.reply.progress, ledger=pieces, where=where, workers=workers,
-            settings=settings, program=program_hash(),
-        )  # fmt: skip
-        files = write_mc(found, self.study.root)
-        if self.done("trials"):
-            record = self.study.stages()["trials"]
-            write_std(found, self.study.trials)
-            kept = [self.study.root / name for name in record["files"]]
-            self.study.record("trials", record["inputs"], kept, record["wall_s"], record["summary"])
-        self.reply.kept = f"What is done is kept in {self.study.root}."
-        return files
-
-    def _spread(self, trajectories: Sequence[Trajectory]) -> dict[str, dict[str, float]] | None:
-        """Standard uncertainties of the indices, where the Monte Carlo study is up to date."""
-        from towtank.montecarlo.files import read_mc, std_of
-
-        if not self.done("mc"):
-            return None
-        values = {t.name: {name: value for name, (value, _) in t.indices.items()} for t in trajectories}
-        return std_of(read_mc(self.study.root), values)
-
     def judge(self) -> None:
         """The verdict."""
-        self._do("verdict", self._judge)
+        self.do("verdict", self._judge)
         self.reply.file("verdict", self.study.verdict)
 
     def _judge(self) -> Sequence[Path]:
@@ -370,7 +317,7 @@ class Chain:
 
     def publish(self) -> None:
         """The report of everything the study holds."""
-        self._do("report", self._publish)
+        self.do("report", self._publish)
         self.reply.file("report", self.study.report)
 
     def _publish(self) -> Sequence[Path]:

@@ -9,6 +9,7 @@ import typer
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
 from towtank.cli.reply import Reply, answering
+from towtank.cli.scatter import scatter
 from towtank.cli.sweep import JOBS, Cluster, Settings, slurm_settings
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def mc(
         chain.drawing = {
             "samples": str(samples), "mass": mass, "cg": cg, "current": current, "seed": str(seed)
         }  # fmt: skip
-        chain.scatter(cluster, workers or (JOBS if cluster == "slurm" else 1), settings)
+        scatter(chain, cluster, workers or (JOBS if cluster == "slurm" else 1), settings)
         from towtank.montecarlo.files import read_mc
 
         _tell(reply, read_mc(chain.study.root))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, Speed, StudyArgument
 from towtank.cli.reply import answering
+from towtank.cli.scatter import compiled, scatter
 from towtank.parallel import cores, prepare
 
 PRELOADED = (
@@ -38,8 +39,8 @@ def run(
         chain.tow()
         chain.derive()
         chain.try_out()
-        if chain.done("mc") or chain.compiled():
-            chain.scatter()
+        if chain.done("mc") or compiled(chain):
+            scatter(chain)
         else:
             reply.log(f"mc       left out: {UNCOMPILED}")
         chain.judge()
