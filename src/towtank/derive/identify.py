@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,10 @@ REPEATED = 0.5
 
 @dataclass(frozen=True)
 class Solved:
-    """A regression. share, spread, weight (R, 6) : family weight, standard deviation, weight of a sample.
+    """A regression. share, spread, weight (R, 6) : family weight times trust, standard deviation, weight of a sample.
 
     covariance (n, n) of the nominal unknowns, from ``blocks`` blocks of the kind ``unit``.
-    gated : roll term -> value, std, in_model, why.
+    gated : roll term -> value, std, in_model, why.   trust (R,) : factor on the weight of each run; None for ones.
     """
 
     choice: Choice
@@ -42,16 +42,31 @@ class Solved:
     blocks: int
     unit: str
     gated: dict[str, dict[str, Any]] = field(default_factory=dict)
+    trust: Array | None = None
 
 
-def identify(runs: Sequence[Run], samples: Samples, weight_steady: float) -> Solved:
+def identify(
+    runs: Sequence[Run],
+    samples: Samples,
+    weight_steady: float,
+    *,
+    trust: Array | None = None,
+    mesh: Array | None = None,
+) -> Solved:
     """Choose the terms, weigh the runs by what is left of a first unweighted fit, solve, and gate the roll terms.
+
+    Parameters
+    ----------
+    weight_steady : lambda.   trust (R,) : factor on the weight of each run, 0 < t <= 1; None for ones.
+    mesh (R, 6) : standard discretisation uncertainty of each load of each run [N, N m]; its square adds to the square
+        of the residual that sets the weight. None where no grid study was made.
 
     Raises
     ------
     DeriveError
-        The runs excite nothing, or ``weight_steady`` is outside 0..1.
+        The runs excite nothing, ``weight_steady`` is outside 0..1, or ``trust`` is outside 0..1.
     """
+    factor = _trust(runs, trust)
     choice = choose(runs, samples)
     if not choice.unknowns:
         raise DeriveError(
@@ -63,7 +78,9 @@ def identify(runs: Sequence[Run], samples: Samples, weight_steady: float) -> Sol
     choice, system = choice.keep([system.names[i] for i in kept], reasons), system.keep(kept)
     first = solve(system, 1.0 / (system.count[:, None] * scale**2))
     spread = weights.spread(system, runs, first.unknowns[:, 0])
-    share = weights.family(system, runs, weight_steady)
+    if mesh is not None:
+        spread = np.hypot(spread, mesh)
+    share = weights.family(system, runs, weight_steady) * factor[:, None]
     solved = weighted(runs, samples, choice, system, spread, share)
     gated = _gate(solved, runs[0].symmetry)
     out = {name: str(entry["why"]) for name, entry in gated.items() if not entry["in_model"]}
@@ -71,7 +88,18 @@ def identify(runs: Sequence[Run], samples: Samples, weight_steady: float) -> Sol
         left = [i for i, name in enumerate(system.names) if name not in out]
         choice, system = choice.keep([system.names[i] for i in left], out), system.keep(left)
         solved = weighted(runs, samples, choice, system, spread, share)
-    return Solved(**{**vars(solved), "gated": gated})
+    return replace(solved, gated=gated, trust=factor)
+
+
+def _trust(runs: Sequence[Run], trust: Array | None) -> Array:
+    """``trust`` checked; ones for None."""
+    factor = np.ones(len(runs)) if trust is None else np.asarray(trust, dtype=float)
+    if factor.shape != (len(runs),) or not ((factor > 0.0) & (factor <= 1.0)).all():
+        raise DeriveError(
+            f"derive: trust has shape {factor.shape} and lies outside 0..1 for {len(runs)} runs. It is a factor on the "
+            "weight of each run, above 0 and at most 1; leave a run out to give it none."
+        )
+    return factor
 
 
 def weighted(

@@ -63,6 +63,8 @@ def sensitivity(solved: Solved, expansion: Expansion, runs: Sequence[Run]) -> di
     out: dict[str, dict[str, float]] = {term: {} for term in KEY_TERMS if term in expansion.names}
     for lam in SENSITIVITY:
         share = weights.family(solved.system, runs, lam)
+        if solved.trust is not None:
+            share = share * solved.trust[:, None]
         nominal = replace(solved.system, rhs=solved.system.rhs[:, :1])
         values = expansion.matrix @ solve(nominal, share / solved.spread**2).unknowns[:, 0]
         for term in out:
