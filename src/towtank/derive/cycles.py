@@ -40,11 +40,25 @@ def settled(runs: Sequence[Run]) -> Samples:
     Source     perron, section 3.5 (the first period carries the start-up of the wake).
     """
     members = ensemble_size(runs)
-    parts = [_of(run, number, members) for number, run in enumerate(runs)]
-    joined = [np.concatenate([part[i] for part in parts]) for i in (0, 1, 2)]
-    loads = np.concatenate([part[3] for part in parts], axis=1)
-    run, period = (np.concatenate([part[i] for part in parts]) for i in (4, 5))
-    return Samples(joined[0], joined[1], joined[2], loads, run.astype(np.intp), period.astype(np.intp))
+    size = [1 if run.steady else len(run.settled) for run in runs]
+    nu, nudot, control = (np.empty((sum(size), k)) for k in (6, 6, 4))
+    loads = np.empty((1 + members, sum(size), 6))
+    number = np.repeat(np.arange(len(runs), dtype=np.intp), size)
+    period = np.zeros(sum(size), dtype=np.intp)
+    start = 0
+    for run, count in zip(runs, size, strict=True):
+        at, to = run.settled, slice(start, start + count)
+        for out, values in ((nu, run.history.nu), (nudot, run.history.nudot), (control, run.control)):
+            out[to] = values[at].mean(axis=0) if run.steady else values[at]
+        loads[0, to] = run.loads[at].mean(axis=0) if run.steady else run.loads[at]
+        if members and run.ensemble is None:
+            loads[1:, to] = loads[0, to]
+        elif run.ensemble is not None:
+            loads[1:, to] = run.ensemble[:, at].mean(axis=1)[:, None] if run.steady else run.ensemble[:, at]
+        if not run.steady:
+            period[to] = np.arange(count) // ((len(run.history.time) - 1) // run.periods)
+        start += count
+    return Samples(nu, nudot, control, loads, number, period)
 
 
 def family_of(run: Run) -> str:
@@ -67,23 +81,6 @@ def ensemble_size(runs: Sequence[Run]) -> int:
             "belong together. Tow all runs with the same number of members."
         )
     return sizes.pop() if sizes else 0
-
-
-def _of(run: Run, number: int, members: int) -> tuple[Array, ...]:
-    at = run.settled
-    stack = [run.loads[None, at]]
-    if members:
-        stack.append(np.broadcast_to(run.loads, (members, *run.loads.shape))[:, at] if run.ensemble is None
-                     else run.ensemble[:, at])  # fmt: skip
-    loads = np.concatenate(stack)
-    arrays = [run.history.nu[at], run.history.nudot[at], run.control[at]]
-    period = np.zeros(len(at), dtype=np.intp)
-    if run.steady:
-        arrays, loads, period = [a.mean(axis=0, keepdims=True) for a in arrays], loads.mean(axis=1)[:, None], period[:1]
-    else:
-        per = (len(run.history.time) - 1) // run.periods
-        period = np.arange(len(at)) // per
-    return (*arrays, loads, np.full(len(period), number), period)
 
 
 def scatter(samples: Samples, runs: int) -> Array:

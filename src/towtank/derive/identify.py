@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from towtank.derive import weights
-from towtank.derive.cycles import Samples, family_of, scatter
+from towtank.derive.cycles import Samples, family_of
 from towtank.derive.regress import Fit, Units, block_covariance, solve
 from towtank.derive.select import Choice, choose, independent
 from towtank.derive.system import System, build
@@ -110,7 +110,7 @@ def weighted(
     fit = solve(system, weight)
     squares = weight * system.squares(fit.unknowns[:, 0])
     misfit = float(squares.sum() / (share * system.count[:, None]).sum())
-    whole = _repeats(samples, system, weight, squares)
+    whole = _repeats(system, weight, squares)
     block = system.run if whole else system.run * (int(system.period.max()) + 1) + system.period
     kinds = sorted({family_of(run) for run in runs if run.steady})
     pool = np.array([kinds.index(family_of(run)) if run.steady else -1 for run in runs], dtype=np.intp)
@@ -119,12 +119,11 @@ def weighted(
     return Solved(choice, system, share, spread, weight, fit, covariance, blocks, unit)
 
 
-def _repeats(samples: Samples, system: System, weight: Array, squares: Array) -> bool:
+def _repeats(system: System, weight: Array, squares: Array) -> bool:
     """True when most of the residual is the same in each period, so that periods are no independent witnesses."""
-    period = scatter(samples, len(system.count))
-    seen = np.isfinite(period)
+    seen = np.isfinite(system.fresh)
     residual = float(squares[seen].sum())
-    fresh = float((weight * system.count[:, None] * np.where(seen, period, 0.0))[seen].sum())
+    fresh = float((weight * system.count[:, None] * np.where(seen, system.fresh, 0.0))[seen].sum())
     return residual > 0.0 and 1.0 - fresh / residual > REPEATED
 
 
