@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -89,11 +90,10 @@ def scatter(samples: Samples, runs: int) -> Array:
     For noise that is independent from period to period this is its variance; for loads that repeat it is zero.
     """
     out = np.full((runs, 6), np.nan)
-    for number in range(runs):
-        at = samples.run == number
-        periods = samples.period[at]
-        count = int(periods.max()) + 1
+    edges = np.searchsorted(samples.run, np.arange(runs + 1))
+    for number, (start, stop) in enumerate(itertools.pairwise(edges)):
+        count = int(samples.period[stop - 1]) + 1 if stop > start else 0
         if count > 1:
-            cycles = samples.loads[0, at].reshape(count, -1, 6)
+            cycles = samples.loads[0, start:stop].reshape(count, -1, 6)
             out[number] = 0.5 * (np.diff(cycles, axis=0) ** 2).mean(axis=(0, 1))
     return out

@@ -66,7 +66,18 @@ def identify(
     DeriveError
         The runs excite nothing, ``weight_steady`` is outside 0..1, or ``trust`` is outside 0..1.
     """
-    factor = _trust(runs, trust)
+    choice, system = assemble(runs, samples)
+    return fitted(runs, choice, system, weight_steady, trust=trust, mesh=mesh)
+
+
+def assemble(runs: Sequence[Run], samples: Samples) -> tuple[Choice, System]:
+    """The terms that the runs tell apart, and their linear system.
+
+    Raises
+    ------
+    DeriveError
+        The runs excite nothing.
+    """
     choice = choose(runs, samples)
     if not choice.unknowns:
         raise DeriveError(
@@ -75,19 +86,39 @@ def identify(
     system = build(samples, choice)
     scale = weights.load_scale(system)
     kept, reasons = independent(system.matrix / scale[system.load][:, None], system.names)
-    choice, system = choice.keep([system.names[i] for i in kept], reasons), system.keep(kept)
+    return choice.keep([system.names[i] for i in kept], reasons), system.keep(kept)
+
+
+def fitted(
+    runs: Sequence[Run],
+    choice: Choice,
+    system: System,
+    weight_steady: float,
+    *,
+    trust: Array | None = None,
+    mesh: Array | None = None,
+) -> Solved:
+    """The regression of a system of ``assemble``: weights, solution, gates, covariance. Arguments as in ``identify``.
+
+    Raises
+    ------
+    DeriveError
+        ``weight_steady`` or ``trust`` is outside 0..1.
+    """
+    factor = _trust(runs, trust)
+    scale = weights.load_scale(system)
     first = solve(system, 1.0 / (system.count[:, None] * scale**2))
     spread = weights.spread(system, runs, first.unknowns[:, 0])
     if mesh is not None:
         spread = np.hypot(spread, mesh)
     share = weights.family(system, runs, weight_steady) * factor[:, None]
-    solved = weighted(runs, samples, choice, system, spread, share)
+    solved = weighted(runs, choice, system, spread, share)
     gated = _gate(solved, runs[0].symmetry)
     out = {name: str(entry["why"]) for name, entry in gated.items() if not entry["in_model"]}
     if out:
         left = [i for i, name in enumerate(system.names) if name not in out]
         choice, system = choice.keep([system.names[i] for i in left], out), system.keep(left)
-        solved = weighted(runs, samples, choice, system, spread, share)
+        solved = weighted(runs, choice, system, spread, share)
     return replace(solved, gated=gated, trust=factor)
 
 
@@ -102,9 +133,7 @@ def _trust(runs: Sequence[Run], trust: Array | None) -> Array:
     return factor
 
 
-def weighted(
-    runs: Sequence[Run], samples: Samples, choice: Choice, system: System, spread: Array, share: Array
-) -> Solved:
+def weighted(runs: Sequence[Run], choice: Choice, system: System, spread: Array, share: Array) -> Solved:
     """Solve with given spread and family weight (R, 6), with the covariance of independent blocks."""
     weight = share / spread**2
     fit = solve(system, weight)

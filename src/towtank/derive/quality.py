@@ -103,8 +103,9 @@ def period_change(samples: Samples, names: Sequence[str]) -> dict[str, float]:
     """
     change = scatter(samples, len(names))
     out = {}
+    edges = np.searchsorted(samples.run, np.arange(len(names) + 1))
     for i, name in enumerate(names):
-        power = (samples.loads[0, samples.run == i] ** 2).mean(axis=0)
+        power = (samples.loads[0, edges[i] : edges[i + 1]] ** 2).mean(axis=0)
         if np.isfinite(change[i]).all() and power.max() > 0.0:
             seen = power > 1e-6 * power.max()
             out[name] = float(np.sqrt((2.0 * change[i, seen] / power[seen]).max()))
