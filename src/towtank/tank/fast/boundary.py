@@ -15,6 +15,7 @@ from towtank.craft.craft import Fin
 from towtank.frames import Array
 
 STEPS = 800
+"""Stations of the march at resolution 1."""
 TRANSITION, END, WAKE_STATION, STERN = 0.03, 0.985, 0.97, 0.85
 """Stations over length: start of turbulence, end of the march, where the drag is read, where the stern begins."""
 SHAPE_LIMIT = 2.6
@@ -62,7 +63,12 @@ def _shape(h_1: Array) -> Array:
 
 
 def march(
-    radius: Callable[[Array], Array], length: float, reynolds: Array, station: Array, speed: Array
+    radius: Callable[[Array], Array],
+    length: float,
+    reynolds: Array,
+    station: Array,
+    speed: Array,
+    steps: int = STEPS,
 ) -> BoundaryLayer:
     """March the layer from transition to the tail.
 
@@ -70,13 +76,14 @@ def march(
     ----------
     radius : x from the nose (n,) -> r [m].   length : [m].   reynolds : (m,) on ``length``.
     station, speed : surface speed over speed ahead at distances from the nose (k,).
+    steps : number of stations.
 
     Source     head1958 entrainment with Cebeci-Bradshaw fits; Ludwieg-Tillmann friction; drag from the momentum
                area in the far wake by Squire-Young for a body of revolution.
     Departure  Marched in the momentum area r theta, which stays finite where the tail gets thin.
     Valid      Attached turbulent flow, Re > 5e5; transition fixed at 3 % of the length. ``SHAPE_LIMIT`` caps H.
     """
-    x = np.linspace(TRANSITION * length, END * length, STEPS)
+    x = np.linspace(TRANSITION * length, END * length, steps)
     r = radius(x)
     ds = np.hypot(np.gradient(x), np.gradient(r))
     u = np.interp(x, station, speed)
@@ -87,14 +94,14 @@ def march(
     area = r[0] * 0.036 * s0 / (u[0] * s0 / viscosity) ** 0.2
     h = np.full_like(viscosity, 1.4)
     flux = u[0] * area * _shape_1(h)
-    areas, shapes = np.empty((STEPS, len(viscosity))), np.empty((STEPS, len(viscosity)))
-    for i in range(STEPS):
+    areas, shapes = np.empty((steps, len(viscosity))), np.empty((steps, len(viscosity)))
+    for i in range(steps):
         areas[i], shapes[i] = area, h
         thickness = area / max(r[i], 1e-6)
         friction = 0.246 * 10.0 ** (-0.678 * h) * np.maximum(u[i] * thickness / viscosity, 50.0) ** -0.268
         area = np.maximum(area + ds[i] * (0.5 * friction * r[i] - (2.0 + h) * area / u[i] * slope[i]), 1e-9)
         flux = flux + ds[i] * u[i] * r[i] * _entrainment(_shape_1(h))
-        h = np.minimum(_shape(flux / (u[min(i + 1, STEPS - 1)] * area)), SHAPE_LIMIT)
+        h = np.minimum(_shape(flux / (u[min(i + 1, steps - 1)] * area)), SHAPE_LIMIT)
     j = int(np.searchsorted(x, WAKE_STATION * length))
     drag = 4.0 * np.pi * areas[j] * u[j] ** ((shapes[j] + 5.0) / 2.0)
     return BoundaryLayer(x, r, u, areas, shapes, drag)

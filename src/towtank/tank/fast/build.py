@@ -10,14 +10,24 @@ import numpy as np
 from towtank.craft.craft import Craft
 from towtank.craft.integrals import hull_integrals
 from towtank.frames import Array, body_x
-from towtank.tank.fast.boundary import WAKE_STATION, BoundaryLayer, march, wake_factor
+from towtank.tank.fast.boundary import STEPS, WAKE_STATION, BoundaryLayer, march, wake_factor
 from towtank.tank.fast.fins import FinData, fin_data
 from towtank.tank.fast.hull import HullData, finite_length_factor
-from towtank.tank.fast.potential import HullFlow, added_mass_with_fins, hull_flow
+from towtank.tank.fast.potential import (
+    CHORDWISE,
+    RINGS,
+    SECTORS,
+    SPANWISE,
+    HullFlow,
+    added_mass_with_fins,
+    hull_flow,
+)
 
 STRIPS = 48
 REYNOLDS_RANGE = np.geomspace(0.05, 3.0, 7)
 """Reynolds numbers of the drag table over that of the design speed."""
+SECTOR_STEP = 8
+"""Sectors come in multiples of this, so that fins at multiples of 45 deg lie between the same panels on every mesh."""
 
 
 @dataclass(frozen=True)
@@ -31,33 +41,46 @@ class Build:
     panels: int
 
 
+def panel_counts(resolution: float) -> tuple[int, int]:
+    """Rings and sectors of the hull's panels at ``resolution``; (72, 24) at 1."""
+    return _scaled(RINGS, resolution), SECTOR_STEP * _scaled(SECTORS // SECTOR_STEP, resolution)
+
+
+def _scaled(count: int, resolution: float) -> int:
+    return max(round(count * resolution), 1)
+
+
 @functools.lru_cache(maxsize=8)
-def _solved(craft: Craft) -> tuple[HullFlow, Array]:
+def _solved(craft: Craft, resolution: float) -> tuple[HullFlow, Array]:
     """Potential flow of hull and fins; it knows no speed."""
-    flow = hull_flow(craft)
-    return flow, added_mass_with_fins(craft, flow)
+    flow = hull_flow(craft, *panel_counts(resolution))
+    return flow, added_mass_with_fins(craft, flow, _scaled(CHORDWISE, resolution), _scaled(SPANWISE, resolution))
 
 
 @functools.lru_cache(maxsize=32)
-def build(craft: Craft, speed: float) -> Build:
-    """Solve the craft at the ``speed`` [m/s] of a test. About a second for a new craft; then kept."""
-    flow, added = _solved(craft)
+def build(craft: Craft, speed: float, resolution: float = 1.0) -> Build:
+    """Solve the craft at the ``speed`` [m/s] of a test. About a second for a new craft; then kept.
+
+    resolution : factor on the number of panels each way, of strips and of stations of the boundary layer.
+    """
+    flow, added = _solved(craft, resolution)
     length = craft.length
     design = craft.water.reynolds(speed, length)
     reynolds = np.append(REYNOLDS_RANGE, 1.0) * design
-    layer = march(craft.profile.radius, length, reynolds, flow.panels.station, flow.surface_speed)
-    astern = _march_astern(craft, flow, design)
+    steps = _scaled(STEPS, resolution)
+    layer = march(craft.profile.radius, length, reynolds, flow.panels.station, flow.surface_speed, steps)
+    astern = _march_astern(craft, flow, design, steps)
     fins = tuple(_fin(craft, layer, index, speed) for index in range(len(craft.fins)))
-    hull = _hull(craft, flow, added, layer, astern, reynolds)
+    hull = _hull(craft, flow, added, layer, astern, reynolds, _scaled(STRIPS, resolution))
     return Build(hull, fins, layer, design, int(np.prod(flow.panels.shape)))
 
 
-def _march_astern(craft: Craft, flow: HullFlow, design: float) -> BoundaryLayer:
+def _march_astern(craft: Craft, flow: HullFlow, design: float, steps: int) -> BoundaryLayer:
     def reversed_radius(x: Array) -> Array:
         return craft.profile.radius(craft.length - np.asarray(x))
 
     station, speed = craft.length - flow.panels.station[::-1], flow.surface_speed[::-1]
-    return march(reversed_radius, craft.length, np.array([design]), station, speed)
+    return march(reversed_radius, craft.length, np.array([design]), station, speed, steps)
 
 
 def _fin(craft: Craft, layer: BoundaryLayer, index: int, speed: float) -> FinData:
@@ -69,10 +92,16 @@ def _fin(craft: Craft, layer: BoundaryLayer, index: int, speed: float) -> FinDat
 
 
 def _hull(
-    craft: Craft, flow: HullFlow, added: Array, layer: BoundaryLayer, astern: BoundaryLayer, reynolds: Array
+    craft: Craft,
+    flow: HullFlow,
+    added: Array,
+    layer: BoundaryLayer,
+    astern: BoundaryLayer,
+    reynolds: Array,
+    strips: int,
 ) -> HullData:
     length, origin = craft.length, craft.origin_from_nose
-    edge = np.linspace(0.0, length, STRIPS + 1)
+    edge = np.linspace(0.0, length, strips + 1)
     middle = 0.5 * (edge[1:] + edge[:-1])
     return HullData(
         density=craft.water.density,

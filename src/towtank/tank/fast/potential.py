@@ -197,14 +197,16 @@ def fin_lattice(craft: Craft, fin: Fin, chordwise: int = CHORDWISE, spanwise: in
     return FinLattice(rings, through, control.mean(axis=1), panel_geometry(rings)[1], panel_geometry(plates)[2])
 
 
-def added_mass_with_fins(craft: Craft, flow: HullFlow) -> Array:
+def added_mass_with_fins(craft: Craft, flow: HullFlow, chordwise: int = CHORDWISE, spanwise: int = SPANWISE) -> Array:
     """Positive added-mass matrix over density (6, 6) of hull and fins, the fins as impermeable plates without lift.
+
+    chordwise, spanwise : vortex rings on a fin each way.
 
     The hull unknowns are eliminated harmonic by harmonic; a dense system is left for the fins.
     """
     if not craft.fins:
         return flow.added_mass
-    lattices = [fin_lattice(craft, fin) for fin in craft.fins]
+    lattices = [fin_lattice(craft, fin, chordwise, spanwise) for fin in craft.fins]
     panels = flow.panels
     rings, sectors = panels.shape
     meetings = _meetings(craft.fins, lattices, panels)

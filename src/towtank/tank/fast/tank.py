@@ -9,12 +9,13 @@ from typing import Any, Literal
 import numpy as np
 
 from towtank.craft.craft import Craft
+from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import sampled
 from towtank.progress import Progress
 from towtank.tank.fast import fins, hull
-from towtank.tank.fast.build import Build, build
+from towtank.tank.fast.build import Build, build, panel_counts
 from towtank.tank.fast.constants import NOMINAL, sample
 from towtank.tank.fast.flags import flags
 from towtank.tank.fast.motion import MotionRecord, record_of
@@ -26,6 +27,11 @@ PHYSICS = 1
 """Raised when a formula of the tank changes, so that runs made with the former one are not taken for its own."""
 MEMORY_TRAVEL = 1.3
 """Lead-in before a test, in lengths travelled: the longest memory is one length."""
+
+RESOLUTIONS = (1.0 / 3.0, 3.0)
+"""Least and largest resolution: 24 by 8 panels, which still have the fins between panels, and 216 by 72, ten seconds."""
+SURFACE = 2
+"""Dimensions of the mesh: panels cover a surface, so their size goes with the root of their number."""
 
 Part = Callable[[hull.HullData, MotionRecord, Mapping[str, Array]], Array]
 HULL_PARTS: dict[str, Part] = {
@@ -45,12 +51,23 @@ class FastTank:
     parts : "all", or "potential" for added mass and Kirchhoff loads alone.
     members : size of the model-form ensemble run beside the nominal constants; 0 for none.
     memory : False makes every load quasi-steady.   seed : of the ensemble.
+    resolution : factor on the panels each way, the strips and the stations of the boundary layer, 1/3 to 3. Meshes are
+        alike at multiples of 1/3.
     """
 
     parts: Literal["all", "potential"] = "all"
     members: int = 48
     memory: bool = True
     seed: int = 0
+    resolution: float = 1.0
+
+    def __post_init__(self) -> None:
+        least, most = RESOLUTIONS
+        if not least - 1e-9 <= self.resolution <= most:
+            raise InputError(
+                f"FastTank: resolution {self.resolution:g} is outside {least:.3g} to {most:g}. Below it the panels no "
+                "longer follow the hull, above it they take minutes and gigabytes. Give a number between, such as 1."
+            )
 
     @property
     def level(self) -> str:
@@ -66,12 +83,19 @@ class FastTank:
             "members": self.members,
             "memory": self.memory,
             "seed": self.seed,
+            "resolution": self.resolution,
             "constants": NOMINAL,
         }
 
+    @property
+    def mesh(self) -> dict[str, Any]:
+        """Name of the mesh, number of hull panels, and dimensions: panels are a surface mesh."""
+        rings, sectors = panel_counts(self.resolution)
+        return {"label": f"panels-{rings}x{sectors}", "cells": rings * sectors, "dimensions": SURFACE}
+
     def run(self, craft: Craft, test: CaptiveTest, progress: Progress) -> Run:
         """Run one captive test. Loads about the body origin, with parts, ensemble and validity flags."""
-        body = build(craft, test.speed)
+        body = build(craft, test.speed, self.resolution)
         motion = self._record(craft, test)
         parts = self.part_loads(body, motion)
         kept = slice(motion.lead, None)
@@ -85,6 +109,7 @@ class FastTank:
             parts={name: load[0, kept] for name, load in parts.items()},
             ensemble=total[1:] if self.members else None,
             flags=flags(body, motion) if self.parts == "all" else ("potential part only",),
+            mesh=self.mesh,
         )
 
     def part_loads(self, body: Build, record: MotionRecord) -> dict[str, Array]:
