@@ -29,7 +29,7 @@ MEMORY_TRAVEL = 1.3
 """Lead-in before a test, in lengths travelled: the longest memory is one length."""
 
 RESOLUTIONS = (1.0 / 3.0, 3.0)
-"""Least and largest resolution: 24 by 8 panels, which still have the fins between panels, and 216 by 72, ten seconds."""
+"""Least and largest resolution: 24 by 8 panels, which still have the fins between panels, and 216 by 72, ten s."""
 SURFACE = 2
 """Dimensions of the mesh: panels cover a surface, so their size goes with the root of their number."""
 
