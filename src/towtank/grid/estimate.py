@@ -37,6 +37,7 @@ class Estimate:
         three meshes the bound of eca2014 in its place. Both NaN when divergent, or oscillatory on more than three.
     uncertainty (n,) : 95 % bound on each mesh, in the unit of the quantity.
     in_range : True when the finest meshes are in the asymptotic range.
+    used : orders of the expansion that the bounds rest on; empty when they rest on a range.
     triplet : Celik's numbers on the three finest meshes.
     """
 
@@ -46,6 +47,7 @@ class Estimate:
     gci: float
     uncertainty: Array
     in_range: bool
+    used: tuple[float, ...]
     triplet: Triplet
 
 
@@ -72,15 +74,15 @@ def estimate(values: Array, size: Array) -> Estimate:
     finest = triplet((phi[-1], phi[-2], phi[-3]), (h[-1], h[-2], h[-3]))
     found = _verdict(phi, h, finest)
     if found == "exact":
-        return Estimate(found, math.nan, float(phi[-1]), 0.0, np.abs(phi - phi[-1]), True, finest)
+        return Estimate(found, math.nan, float(phi[-1]), 0.0, np.abs(phi - phi[-1]), True, (), finest)
     if found == "monotone":
         return _three(phi, h, finest) if len(phi) == LEAST_MESHES else _many(phi, h, finest)
     factor = OSCILLATORY if found == "oscillatory" else DIVERGENT
     bound = factor * np.array([oscillation_uncertainty(tuple(phi[_window(i, len(phi)) :])) for i in range(len(phi))])
     if len(phi) == LEAST_MESHES:
-        return Estimate(found, finest.order, finest.extrapolated, finest.gci, bound, False, finest)
+        return Estimate(found, finest.order, finest.extrapolated, finest.gci, bound, False, (), finest)
     # The three finest may look better than the whole set: neither their limit nor their index is then believed.
-    return Estimate(found, _order(phi, h, found), math.nan, math.nan, bound, False, finest)
+    return Estimate(found, _order(phi, h, found), math.nan, math.nan, bound, False, (), finest)
 
 
 def check_sizes(size: Array) -> None:
@@ -129,7 +131,7 @@ def _three(phi: Array, h: Array, finest: Triplet) -> Estimate:
     limit = phi[-1] + (phi[-1] - phi[-2]) / math.expm1(used * math.log(h[-2] / h[-1]))
     bound = (SAFETY if believed else SAFETY_TWO) * np.abs(phi - limit)
     in_range = believed and abs(finest.asymptotic - 1.0) <= ASYMPTOTIC
-    return Estimate("monotone", order, finest.extrapolated, finest.gci, bound, in_range, finest)
+    return Estimate("monotone", order, finest.extrapolated, finest.gci, bound, in_range, (used,), finest)
 
 
 def _many(phi: Array, h: Array, finest: Triplet) -> Estimate:
@@ -145,4 +147,4 @@ def _many(phi: Array, h: Array, finest: Triplet) -> Estimate:
         bound = 3.0 * fit.scatter / spread * (error + fit.scatter + off)
     gci = float(bound[-1] / abs(phi[-1])) if phi[-1] != 0.0 else math.inf
     steady = finest.verdict == "monotone" and abs(finest.order - fit.order) <= ORDERS_APART * fit.order
-    return Estimate("monotone", fit.order, fit.limit, gci, bound, believed and steady, finest)
+    return Estimate("monotone", fit.order, fit.limit, gci, bound, believed and steady, fit.used, finest)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,9 @@ from towtank.tank.run import Run
 
 RESOLUTIONS = (2.0 / 3.0, 1.0, 4.0 / 3.0, 5.0 / 3.0)
 """Of the default study: multiples of 1/3, at which the meshes are alike; 1 is the resolution of the tank."""
+
+NEAR = 0.005
+"""Resolutions this near to a multiple of 1/3 are taken for it: 0.667 and 2/3 are one mesh, and one set of runs."""
 
 RUNS = ("drift-00", "drift-p10", "incidence-p10", "sway-v0.28-w1.25", "heave-v0.28-w1.25", "yaw-r0.45-w1.75",
         "pitch-r0.45-w1.75", "roll-a10-w2", "surge-u0.1-w1.5", "turn-p0.30", "rudder-p10", "elevator-p10",
@@ -59,7 +63,7 @@ def tow_on_meshes(
         Fewer than three resolutions, two that make the same mesh, or one out of range.
     """
     base = FastTank(members=0) if tank is None else tank
-    tanks = [replace(base, resolution=float(resolution)) for resolution in resolutions]
+    tanks = [replace(base, resolution=_snapped(resolution)) for resolution in resolutions]
     labels = [item.mesh["label"] for item in tanks]
     if len(set(labels)) < max(len(labels), LEAST_MESHES):
         raise InputError(
@@ -68,6 +72,11 @@ def tow_on_meshes(
         )
     folders = [None if out is None else Path(out) / "grid" / label for label in labels]
     return tuple(tow(plan, item, folder, progress) for item, folder in zip(tanks, folders, strict=True))
+
+
+def _snapped(resolution: float) -> float:
+    near = round(3.0 * resolution) / 3.0 if math.isfinite(resolution) else resolution
+    return near if abs(near - resolution) <= NEAR else float(resolution)
 
 
 def fast_grid_study(

@@ -59,6 +59,7 @@ def _quantity(item: Quantity, study: GridStudy) -> dict[str, Any]:
         "verdict": it.verdict,
         "uncertainty": it.uncertainty,
         "in_range": it.in_range,
+        "used": list(it.used),
         "run": item.run,
         "kind": item.kind,
         "load": item.load,
@@ -98,7 +99,8 @@ def _read_quantity(item: dict[str, Any]) -> Quantity:
     triplet = Triplet(told.pop("verdict"), **{key: _number(value) for key, value in told.items()})
     found = Estimate(
         item["verdict"], _number(item["order"]), _number(item["extrapolated"]), _number(item["gci"]),
-        np.array([_number(value) for value in item["uncertainty"]]), bool(item["in_range"]), triplet,
+        np.array([_number(value) for value in item["uncertainty"]]), bool(item["in_range"]),
+        tuple(float(order) for order in item["used"]), triplet,
     )  # fmt: skip
     values = tuple(float(value) for value in item["values"])
     return Quantity(item["run"], item["kind"], item["load"], item["measure"], values, float(item["scale"]), found)

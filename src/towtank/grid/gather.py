@@ -94,7 +94,11 @@ def _one_mesh(runs: Sequence[Run]) -> Mesh:
         labels = ", ".join(sorted(f"{mesh.label} ({mesh.cells} cells)" for mesh in meshes))
         raise InputError(f"grid: one set holds runs of several meshes: {labels}. Give one folder for each mesh.")
     if twice := [name for name, number in Counter(run.name for run in runs).items() if number > 1]:
-        raise InputError(f"grid: run {twice[0]} is there twice on one mesh. Leave one of them.")
+        ids = ", ".join(run.id for run in runs if run.name == twice[0])
+        raise InputError(
+            f"grid: run {twice[0]} is there twice on one mesh ({ids}), made with different settings. Leave one of each; "
+            "the settings stand in the provenance of the runs."
+        )
     return meshes.pop()
 
 
