@@ -105,7 +105,7 @@ def draw(
     """
     if count < 1:
         raise InputError(f"Monte Carlo: {count} samples. Ask for one or more.")
-    factor = root_of(model.derivatives.covariance) if root is None else root
+    factor = root_of(model.derivatives.covariance, model.derivatives.values) if root is None else root
     columns = _once(model, count, given, factor, (seed, piece))
     bad = ~_sound(model, columns)
     if bad.mean() > MOST_LOST and count >= 10:

@@ -96,7 +96,7 @@ def study_of(
     made = recipe(model)
     key = digest([_identity(model), given, seed, _trials_identity(made), program], 16)
     hold(key, made)
-    return Study(model, recipe, given, seed, root_of(model.derivatives.covariance), key, told)
+    return Study(model, recipe, given, seed, root_of(model.derivatives.covariance, model.derivatives.values), key, told)
 
 
 def _checked(samples: int, size: int, seed: int, ledger: Path | str | None, where: str | None) -> None:

@@ -58,7 +58,7 @@ def samples(model: Model, count: int = SAMPLES, slopes: str = "origin", seed: in
     d = to_variant(model.derivatives, "lumped")
     if slopes == "origin" and not d.origin:
         raise InputError(f"the derivatives of {d.craft} hold no slopes at the origin. Use slopes='wide'.")
-    drawn = np.random.default_rng(seed).standard_normal((count, len(d.names))) @ root_of(d.covariance).T
+    drawn = np.random.default_rng(seed).standard_normal((count, len(d.names))) @ root_of(d.covariance, d.values).T
     drawn = np.vstack([np.zeros(len(d.names)), drawn])
     out = {name: d.values[i] + drawn[:, i] for i, name in enumerate(d.names)}
     if slopes == "origin":
