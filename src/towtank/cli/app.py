@@ -10,6 +10,7 @@ from towtank.cli.assess import assess
 from towtank.cli.check import check
 from towtank.cli.derive import derive
 from towtank.cli.doctor import doctor
+from towtank.cli.grid import grid
 from towtank.cli.mc import mc
 from towtank.cli.new import new
 from towtank.cli.plan import plan
@@ -48,5 +49,5 @@ def options(
     """Options before the command; ``--version`` acts in its callback."""
 
 
-for _command in (run, new, check, plan, tow, status, derive, trial, mc, assess, sweep, report, doctor):
+for _command in (run, new, check, plan, tow, status, grid, derive, trial, mc, assess, sweep, report, doctor):
     app.command()(_command)

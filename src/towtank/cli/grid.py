@@ -19,7 +19,7 @@ Places = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="CRAFT | DIR DIR DIR ...",
-        help="A craft or study folder, for the fast tank; or three or more folders, each with the same runs on one mesh.",
+        help="A craft or study folder, for the fast tank; or three or more folders, each of the same runs on a mesh.",
         show_default=False,
     ),
 ]

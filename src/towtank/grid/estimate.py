@@ -65,9 +65,10 @@ def estimate(values: Array, size: Array) -> Estimate:
 
     Source     celik2008 with three meshes; eca2014 with more; ittc75030101 for the oscillatory.
     Departure  The bound of celik2008 holds on the finest mesh. Here every mesh has one: the factor of safety times the
-               distance from the extrapolated value; on the finest it is the index. An order above 2.1 is taken as 2
-               and one below 0.5 as 1, both with the factor 3. Values that do not converge get half their range
-               (their own mesh, the next coarser, and all finer ones, three at least) times OSCILLATORY or DIVERGENT.
+               distance from the extrapolated value; on the finest it is the index. With three meshes an order above
+               2.1 is taken as 2 and one below 0.5 as 0.5, both with the factor 3. Values that do not converge get half
+               their range (their own mesh, the next coarser, and all finer ones, three at least) times OSCILLATORY or
+               DIVERGENT.
     """
     phi, h = np.asarray(values, dtype=float), np.asarray(size, dtype=float)
     check_sizes(h)
@@ -125,9 +126,12 @@ def _verdict(phi: Array, h: Array, finest: Triplet) -> Verdict:
 
 
 def _three(phi: Array, h: Array, finest: Triplet) -> Estimate:
-    """celik2008; the bound of the other meshes from the same extrapolated value."""
+    """celik2008; the bound of the other meshes from the same extrapolated value.
+
+    The check of the range is phi1 / phi2, because p makes both indices agree: it only says that the values are close.
+    """
     order, believed = finest.order, BELIEVED[0] <= finest.order <= BELIEVED[1]
-    used = order if believed else 1.0 if order < BELIEVED[0] else HIGHEST
+    used = order if believed else LOWEST if order < LOWEST else HIGHEST
     limit = phi[-1] + (phi[-1] - phi[-2]) / math.expm1(used * math.log(h[-2] / h[-1]))
     bound = (SAFETY if believed else SAFETY_TWO) * np.abs(phi - limit)
     in_range = believed and abs(finest.asymptotic - 1.0) <= ASYMPTOTIC

@@ -33,7 +33,7 @@ class Mesh:
     def size(self) -> float:
         """Representative size h = cells^(-1/dimensions), over the root of the volume.
 
-        Source     celik2008, eq. 1.
+        Source     celik2008, step 1.
         """
         return float(self.cells ** (-1.0 / self.dimensions))
 
@@ -96,8 +96,8 @@ def _one_mesh(runs: Sequence[Run]) -> Mesh:
     if twice := [name for name, number in Counter(run.name for run in runs).items() if number > 1]:
         ids = ", ".join(run.id for run in runs if run.name == twice[0])
         raise InputError(
-            f"grid: run {twice[0]} is there twice on one mesh ({ids}), made with different settings. Leave one of each; "
-            "the settings stand in the provenance of the runs."
+            f"grid: run {twice[0]} is there twice on one mesh ({ids}), made with different settings. "
+            "Leave one of each; the settings stand in the provenance of the runs."
         )
     return meshes.pop()
 

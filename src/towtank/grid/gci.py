@@ -36,7 +36,7 @@ class Triplet:
     order : observed order p, signed; negative when the changes grow with refinement. NaN when exact.
     extrapolated : value at zero mesh size.   error, extrapolated_error : relative to phi1 and to the extrapolated.
     gci, gci_coarse : index of the finest and of the middle mesh, relative to their values.
-    asymptotic : gci_coarse / (r21^p gci), 1 in the asymptotic range.
+    asymptotic : gci_coarse / (r21^p gci), 1 in the asymptotic range; it equals phi1 / phi2, as both rest on one p.
     ratio : R = e21 / e32 of the ITTC procedure.
     """
 
@@ -56,7 +56,7 @@ def observed_order(e21: float, e32: float, r21: float, r32: float) -> float:
 
     p ln r21 = ln |e32 / e21| + ln((r21^p - s) / (r32^p - s)), s the sign of e32 / e21.
 
-    Source     celik2008, eq. 5: its fixed point. The absolute value there is that of the whole right-hand side.
+    Source     celik2008, step 3: its fixed point. The absolute value there is that of the whole right-hand side.
     Departure  Found by bracketing: the difference of both sides has one root, and the sign of p is kept, so that
                growing changes are seen. celik2008 gives |p|.
     Valid      r21 and r32 above 1, e21 and e32 not zero. |p| is bounded by LARGEST_ORDER.
@@ -87,7 +87,7 @@ def _log_difference(log_ratio: float, p: float, s: float) -> float:
 def extrapolate(phi1: float, phi2: float, r21: float, p: float) -> float:
     """Value at zero mesh size by Richardson's extrapolation at order ``p`` above 0.
 
-    Source     celik2008, eq. 6.
+    Source     celik2008, step 4.
     """
     return phi1 + (phi1 - phi2) / math.expm1(p * math.log(r21))
 
@@ -95,7 +95,7 @@ def extrapolate(phi1: float, phi2: float, r21: float, p: float) -> float:
 def approximate_error(phi1: float, phi2: float) -> float:
     """|phi1 - phi2| over |phi1|. Infinite at phi1 = 0 when they differ.
 
-    Source     celik2008, eq. 7 (first part).
+    Source     celik2008, step 5.
     """
     return _share(phi1 - phi2, phi1)
 
@@ -105,7 +105,7 @@ def index(phi1: float, phi2: float, r21: float, p: float, meshes: int = 3) -> fl
 
     meshes : number of meshes that the order was observed on. With two the order is an assumption and the factor is 3.
 
-    Source     celik2008, eq. 8; roache1998 for the two factors.
+    Source     celik2008, step 5; roache1998 for the two factors.
     """
     factor = SAFETY if meshes > 2 else SAFETY_TWO
     return factor * approximate_error(phi1, phi2) / math.expm1(p * math.log(r21))

@@ -9,7 +9,8 @@ from towtank.grid.study import GridStudy, Quantity
 HEAD = ("run", "load", "measure", "finest", "extrapolated", "order", "GCI %", "bound %", "verdict")
 UNITS = (
     "Values in N and N m. bound %: 95 % bound on the chosen mesh over the size of the load in the run\n"
-    "(its root mean square, for harmonics times 1.41; for a peak itself)."
+    "(its root mean square, for harmonics times 1.41; for a peak itself).\n"
+    "GCI %: of the finest mesh; on more than three meshes the bound of the least-squares fit in its place."
 )
 
 
