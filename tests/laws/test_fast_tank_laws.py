@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from towtank import read_craft
 from towtank.craft.craft import Craft
 from towtank.plan.kinds import CaptiveTest
-from towtank.plan.motion import Drift, Sway, Turn
+from towtank.plan.motion import Drift, Sway, Turn, Yaw
 from towtank.progress import Silent
 from towtank.tank.fast.build import build
 from towtank.tank.fast.fins import interference, lift_slope
@@ -170,6 +170,18 @@ def test_cross_flow_memory_makes_the_quadratic_term_fall_with_frequency() -> Non
         phase = omega * run.history.time[run.settled]
         third.append(2.0 * np.mean(run.parts["crossflow"][run.settled, 1] * np.cos(phase)))
     assert abs(third[0]) > abs(third[1]) > abs(third[2])
+
+
+def test_without_memory_an_oscillation_is_a_row_of_steady_states() -> None:
+    omega = 2.5 * 3.344 / X_FINS.length
+    test = CaptiveTest("yaw", 3.344, Yaw(3.344, 0.3, omega), periods=2, samples=32)
+    run = FastTank(members=0, memory=False).run(X_FINS, test, Silent())
+    alone = steady(X_FINS, run.history.nu)
+    for part in ("tail", "crossflow", "drag", "fins"):
+        assert run.parts[part] == pytest.approx(alone[part], abs=ROUNDING)
+    assert any("quasi-steady" in flag for flag in run.flags)
+    remembered = TANK.run(X_FINS, test, Silent())
+    assert np.abs(run.parts["fins"] - remembered.parts["fins"]).max() > 0.02 * np.abs(remembered.parts["fins"]).max()
 
 
 @pytest.mark.parametrize("members", [0, 8])

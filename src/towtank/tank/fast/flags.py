@@ -43,7 +43,8 @@ def _motion_flags(body: Build, record: MotionRecord) -> list[str]:
     elif angle > 20.5:
         found.append(f"angle to the flow {angle:.0f} deg above 20 deg: the cross-flow law was set to 18 deg")
     if len(u) > 2 and not record.remembers:
-        found.append("memory switched off: it needs headway all along the run")
+        why = "it needs headway all along the run" if record.memory else "as asked, every load is quasi-steady"
+        found.append(f"memory switched off: {why}")
     for index, data in enumerate(body.fins):
         stall = np.degrees(float(np.interp(data.aspect, STALL_ASPECT, STALL_ANGLE)))
         largest = float(np.degrees(np.abs(record.delta[:, index]).max()))

@@ -15,7 +15,7 @@ from towtank.plan.history import History
 class MotionRecord:
     """Samples (N,) of which the first ``lead`` lie before the test begins; they feed the memory and are not reported.
 
-    nu, nudot (N, 6); delta (N, n_fins) [rad].
+    nu, nudot (N, 6); delta (N, n_fins) [rad].   memory : False makes every load quasi-steady.
     """
 
     time: Array
@@ -23,6 +23,7 @@ class MotionRecord:
     nudot: Array
     delta: Array
     lead: int = 0
+    memory: bool = True
 
     @cached_property
     def travelled(self) -> Array:
@@ -33,7 +34,7 @@ class MotionRecord:
     def remembers(self) -> bool:
         """Memory needs headway all along the record; without it the loads are quasi-steady."""
         u = self.nu[:, 0]
-        return bool(len(u) > 2 and u.min() > 1e-3 * max(np.abs(self.nu[:, :3]).max(), 1e-12))
+        return bool(self.memory and len(u) > 2 and u.min() > 1e-3 * max(np.abs(self.nu[:, :3]).max(), 1e-12))
 
     def integral(self, rate: Array) -> Array:
         """Running time integral (N,) of ``rate`` (N,) by the trapezoidal rule."""
@@ -81,7 +82,7 @@ def slip(record: MotionRecord, x: Array, behind_bow: Array) -> tuple[Array, Arra
     return since(v, r, 1.0), since(w, q, -1.0)
 
 
-def record_of(history: History, lead: int, fins: Array) -> MotionRecord:
+def record_of(history: History, lead: int, fins: Array, memory: bool = True) -> MotionRecord:
     """MotionRecord of a sampled history; ``fins`` (n_fins,) [rad] are held."""
     delta = np.broadcast_to(fins, (len(history.time), len(fins)))
-    return MotionRecord(history.time, history.nu, history.nudot, delta, lead)
+    return MotionRecord(history.time, history.nu, history.nudot, delta, lead, memory)

@@ -124,7 +124,7 @@ class FastTank:
     def _record(self, craft: Craft, test: CaptiveTest) -> MotionRecord:
         times = sampled(test).time
         if not test.motion.period or not self.memory:
-            return record_of(test.motion.history(times), 0, _fins(craft, test))
+            return record_of(test.motion.history(times), 0, _fins(craft, test), self.memory)
         step = times[1] - times[0]
         lead = int(np.ceil(MEMORY_TRAVEL * craft.length / (test.speed * step)))
         extended = np.concatenate([times[0] - step * np.arange(lead, 0, -1), times])
