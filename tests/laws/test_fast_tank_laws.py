@@ -178,7 +178,8 @@ def test_without_memory_an_oscillation_is_a_row_of_steady_states() -> None:
     run = FastTank(members=0, memory=False).run(X_FINS, test, Silent())
     alone = steady(X_FINS, run.history.nu)
     for part in ("tail", "crossflow", "drag", "fins"):
-        assert run.parts[part] == pytest.approx(alone[part], abs=ROUNDING)
+        # the cross-flow is summed in single precision: 1e-7 of the largest strip, of which there are 200
+        assert run.parts[part] == pytest.approx(alone[part], abs=2e-5 * np.abs(alone[part]).max() + ROUNDING)
     assert any("quasi-steady" in flag for flag in run.flags)
     remembered = TANK.run(X_FINS, test, Silent())
     assert np.abs(run.parts["fins"] - remembered.parts["fins"]).max() > 0.02 * np.abs(remembered.parts["fins"]).max()
