@@ -182,7 +182,8 @@ def test_without_memory_an_oscillation_is_a_row_of_steady_states() -> None:
         assert run.parts[part] == pytest.approx(alone[part], abs=2e-5 * np.abs(alone[part]).max() + ROUNDING)
     assert any("quasi-steady" in flag for flag in run.flags)
     remembered = TANK.run(X_FINS, test, Silent())
-    assert np.abs(run.parts["fins"] - remembered.parts["fins"]).max() > 0.02 * np.abs(remembered.parts["fins"]).max()
+    # the wash of the bow is small in yaw about the middle, and still a thousand times the round-off
+    assert np.abs(run.parts["fins"] - remembered.parts["fins"]).max() > 1e-2 * np.abs(remembered.parts["fins"]).max()
 
 
 @pytest.mark.parametrize("members", [0, 8])
