@@ -19,6 +19,8 @@ _PUBLIC = {
     "LpmTank": "towtank.tank.lpm",
     "Run": "towtank.tank.run",
     "Derivatives": "towtank.derive.table",
+    "read_coefficients": "towtank.derive.published",
+    "consistency": "towtank.derive.consistency",
     "Model": "towtank.model.equations",
     "ExtraLoad": "towtank.model.extra",
     "read_model": "towtank.model.files",

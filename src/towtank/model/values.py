@@ -9,32 +9,19 @@ import numpy as np
 
 from towtank.craft.craft import Craft
 from towtank.derive.table import Derivatives, Reference
+from towtank.derive.variant import SHARES
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.symbols import LOADS, RATES, TERMS
 
 VARIANTS = ("lumped", "split")
 
-_SHIFTS: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = (
-    ("Xvr", (("Yvdot", -1.0),)),
-    ("Xrr", (("Yrdot", -1.0),)),
-    ("Xwq", (("Zwdot", 1.0),)),
-    ("Xqq", (("Zqdot", 1.0),)),
-    ("Yur", (("Xudot", 1.0),)),
-    ("Zuq", (("Xudot", -1.0),)),
-    ("Muw", (("Xudot", 1.0), ("Zwdot", -1.0))),
-    ("Muq", (("Zqdot", -1.0),)),
-    ("Nuv", (("Yvdot", 1.0), ("Xudot", -1.0))),
-    ("Nur", (("Yrdot", 1.0),)),
-)
-"""Term -> what the products left out of eq. 2.15 contribute to it: lumped = split + sum(sign * added mass)."""
-
 _BLOCKS = ({"X", "Z", "M", "u", "w", "q"}, {"Y", "K", "N", "v", "p", "r"})
 
 
 def shares(term: str) -> tuple[tuple[str, float], ...]:
     """Added masses and factors whose sum is the lumped ``term`` less the split one; empty for most terms."""
-    return dict(_SHIFTS).get(term, ())
+    return SHARES.get(term, ())
 
 
 def values_of(derivatives: Derivatives) -> dict[str, float]:
@@ -118,7 +105,7 @@ def _shifted(values: Mapping[str, float], sign: float) -> dict[str, float]:
                     "with the variant the set was identified in."
                 )
     out = dict(values)
-    for term, shares in _SHIFTS:
+    for term, shares in SHARES.items():
         shift = sum(factor * values.get(name, 0.0) for name, factor in shares)
         if shift != 0.0:
             out[term] = out.get(term, 0.0) + sign * shift
@@ -130,11 +117,11 @@ def to_variant(derivatives: Derivatives, variant: str) -> Derivatives:
     if derivatives.variant == variant:
         return derivatives
     change = lumped_to_split if variant == "split" else split_to_lumped
-    full = replaced(derivatives, {term: derivatives[term] for term, _ in _SHIFTS})
+    full = replaced(derivatives, {term: derivatives[term] for term in SHARES})
     names = full.names
     jacobian = np.eye(len(names))
     sign = -1.0 if variant == "split" else 1.0
-    for term, shares in _SHIFTS:
+    for term, shares in SHARES.items():
         for name, factor in shares:
             if name in names:
                 jacobian[names.index(term), names.index(name)] += sign * factor
