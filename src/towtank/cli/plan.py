@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -47,6 +48,15 @@ Rehearse = Annotated[
     ),
 ]
 
+Export = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Write motion tables, a STAR-CCM+ macro and the mapping to import its runs.",
+        show_default=False,
+    ),
+]
+
 
 def plan(
     craft: StudyArgument = None,
@@ -57,6 +67,7 @@ def plan(
     cost: Cost = None,
     criterion: Criterion = None,
     rehearse: Rehearse = None,
+    export: Export = None,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -84,6 +95,19 @@ def plan(
         else:
             chain.make_plan()
         _tell(reply, chain)
+        if export is not None:
+            _export(reply, chain, export)
+
+
+def _export(reply: Reply, chain: Chain, folder: Path) -> None:
+    import os
+
+    from towtank.tank.imported.export import write_export
+
+    craft = Path(os.path.relpath(chain.study.craft, folder)).as_posix()
+    for noun, path in write_export(chain.plan(), folder, craft).items():
+        reply.file(noun, path)
+        reply.say(f"{path}")
 
 
 def _tell(reply: Reply, chain: Chain) -> None:
