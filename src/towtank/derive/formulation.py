@@ -39,6 +39,7 @@ class Formulation:
 
     entries : their name -> what becomes of it.
     implied : cross term -> the sum of our terms that the added-mass bracket puts in its place.
+    filled : our terms that the formulation lacks and that follow from its M_A.
     variant : "lumped" or "split".
     """
 
@@ -46,6 +47,7 @@ class Formulation:
     words: str
     entries: Mapping[str, Entry]
     implied: Mapping[str, tuple[tuple[str, float], ...]] = field(default_factory=dict)
+    filled: tuple[str, ...] = ()
     variant: str = "lumped"
 
 
@@ -79,6 +81,7 @@ PRINTED = Formulation(
         "Xuw": Entry("u w", remark=_LINEAR),
         "Xur": Entry("u r", remark=_LINEAR),
     },
+    filled=("Xvr", "Xwq", "Xqq"),
 )
 """Source     perron, eq. 2.13, 2.16, 2.18.   Departure  THEORY section 2; docs/decisions/0002."""
 

@@ -13,10 +13,11 @@ import numpy as np
 
 from towtank.derive.formulation import FORMULATIONS, RIGHT_HAND, SYMMETRIES, Entry, Formulation
 from towtank.derive.table import Derivatives, Reference
+from towtank.derive.variant import SHARES
 from towtank.errors import InputError, TowtankError
 from towtank.provenance import provenance
 from towtank.quantity import si
-from towtank.symbols import TERMS, Term
+from towtank.symbols import FOURFOLD_TIES, TERMS, Term
 
 SCHEMA = "towtank/coefficients/1"
 
@@ -95,7 +96,7 @@ def read_coefficients(path: Path | str) -> Derivatives:
 
 
 def read_set(path: Path | str) -> Derivatives:
-    """A set of either kind: ``derivatives.json`` of this project, or a coefficient file.
+    """A set of either kind: ``derivatives.json`` of this project (or its study folder), or a coefficient file.
 
     Raises
     ------
@@ -105,6 +106,7 @@ def read_set(path: Path | str) -> Derivatives:
     from towtank.derive.files import read_derivatives
 
     path = Path(path)
+    path = path / "derivatives.json" if path.is_dir() else path
     return read_derivatives(path) if path.suffix == ".json" else read_coefficients(path)
 
 
@@ -148,7 +150,7 @@ def set_of(raw: Mapping[str, Any], where: str) -> Derivatives:
         if not getattr(reference, key) > 0.0:
             page.faults.append(f"reference.{key} is not positive. Primes are divided by it.")
     body = _numbers(page, raw, "body", _BODY)
-    read = _Reading(page, formulation, sense, prime, reference, _sides(page, raw))
+    read = _Reading(page, formulation, sense, prime, symmetry, reference, _sides(page, raw))
     read.all(page.table(raw, "terms"), page.table(raw, "std"))
     if page.faults:
         raise InputError(f"{where} cannot be read as a coefficient file:\n  " + "\n  ".join(page.faults))
@@ -214,6 +216,7 @@ class _Reading:
     formulation: Formulation
     sense: str
     prime: bool
+    symmetry: str
     reference: Reference
     sides: Mapping[str, float]
     values: dict[str, float] = field(default_factory=dict)
@@ -235,6 +238,22 @@ class _Reading:
         if self.sense != "body":
             which = "Added-mass and damping terms stand" if self.sense == "left" else "Damping terms stand"
             self.departures.append(f"{which} on the left-hand side of the file; their signs are turned here.")
+        self.fill()
+
+    def fill(self) -> None:
+        """Add the terms that have no place in the formulation: from M_A, or from the other plane of a 4-fold craft."""
+        for name in self.formulation.filled:
+            ((source, factor),) = SHARES[name]
+            twin, sign = FOURFOLD_TIES.get(name, ("", 0.0))
+            if source not in self.values:
+                continue
+            if self.symmetry == "fourfold" and twin in self.values:
+                source, factor = twin, sign
+            self.values[name] = factor * self.values[source]
+            self.departures.append(
+                f"{name} = {self.values[name]:.4g} is added from {source}: the formulation has no place for it, and "
+                "its added-mass bracket leaves it out. Without it a turn loses too little speed."
+            )
 
     def term(self, name: str, given: Any, spread: Any) -> None:
         """Read one term and its standard uncertainty."""
