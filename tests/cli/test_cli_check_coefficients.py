@@ -157,6 +157,7 @@ FAULTS = {
     "unknown symmetry": ('"fourfold"', '"axial"', "mirror"),
     "missing reference": ('length = "4 m"\n', "", "reference.length is missing"),
     "length of zero": ('length = "4 m"', "length = 0", "not positive"),
+    "diameter of zero": ("[tested]", "[body]\ndiameter = 0\n[tested]", "body.diameter is not positive"),
     "wrong dimension": ("Yuv = 60", 'Yuv = "60 kg"', "terms.Yuv"),
     "not a number": ("Yuv = 60", "Yuv = nan", "terms.Yuv"),
     "text that is no quantity": ("Yuv = 60", 'Yuv = "sixty"', "terms.Yuv"),

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from consistency_cases import BODY, REFERENCE, SOUND, a_set, correlated, found, sound, without
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from towtank.craft.library import read_craft
 from towtank.derive.agreement import compare
@@ -245,3 +247,19 @@ def test_every_check_is_a_document_with_five_keys():
         content = check.document()
         assert list(content) == ["check", "verdict", "value", "limit", "words"]
         assert content["words"]
+
+
+@given(
+    values=st.dictionaries(st.sampled_from(list(TERMS)), st.floats(-1e6, 1e6, allow_subnormal=False), min_size=1),
+    spread=st.sampled_from([0.0, 0.3]),
+    symmetry=st.sampled_from(["", "fourfold", "mirror"]),
+    body=st.sampled_from([{}, BODY, {"diameter": 9.0}]),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_set_has_verdicts_in_finite_numbers(values, spread, symmetry, body):
+    std = {name: spread * abs(value) for name, value in values.items()}
+    d = a_set(values, std=std, symmetry=symmetry, body=body)
+    for check in (*consistency(d), *compare(d, d)):
+        assert check.verdict in (PASS, WARN, FAIL, NOT_APPLICABLE)
+        assert check.value is None or np.isfinite(check.value)
+    assert all(check.verdict in (PASS, NOT_APPLICABLE) for check in compare(d, d))

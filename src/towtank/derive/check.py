@@ -154,7 +154,7 @@ def subject(derivatives: Derivatives, craft: Craft | None = None) -> Subject:
     lumped = _lumped(derivatives)
     stated = derivatives.quality.get("body", {})
     if craft is None:
-        body = Body(stated.get("displaced_mass"), stated.get("diameter"))
+        body = Body(stated.get("displaced_mass") or None, stated.get("diameter") or None)
         return Subject(lumped, str(derivatives.quality.get("symmetry", "")), _filled(body, derivatives.reference))
     gap = abs(craft.origin_from_nose - derivatives.reference.origin_from_nose)
     if gap > 0.02 * craft.length:

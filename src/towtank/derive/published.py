@@ -150,6 +150,9 @@ def set_of(raw: Mapping[str, Any], where: str) -> Derivatives:
         if not getattr(reference, key) > 0.0:
             page.faults.append(f"reference.{key} is not positive. Primes are divided by it.")
     body = _numbers(page, raw, "body", _BODY)
+    page.faults += [
+        f"body.{key} is not positive. Leave it out if it is not known." for key in body if not body[key] > 0.0
+    ]
     read = _Reading(page, formulation, sense, prime, symmetry, reference, _sides(page, raw))
     read.all(page.table(raw, "terms"), page.table(raw, "std"))
     if page.faults:
