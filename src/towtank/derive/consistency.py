@@ -16,8 +16,8 @@ from towtank.derive.table import Derivatives
 from towtank.symbols import FOURFOLD_TIES
 
 TIE_LIMIT, TIE_WORST = 0.10, 0.30
-"""Gap between the planes of a 4-fold craft. roddy1990 states 4 to 5 % (static) and 10 % (rotary) at 95 %; three times
-the larger is no scatter."""
+"""Gap between the planes of a 4-fold craft. roddy1990 states 4 to 5 % (static) and 10 % (rotary) at 95 %. The second is
+judgement: three times the larger is no scatter."""
 
 SMALL = 0.02
 """Share of a load in a lively manoeuvre below which a gap cannot be seen in the motion. Judgement: a few times below

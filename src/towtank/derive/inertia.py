@@ -11,16 +11,17 @@ from towtank.symbols import LOADS, RATES
 
 SYMMETRY_LIMIT, SYMMETRY_WORST = 0.07, 0.20
 """Gap of the halves of M_A over the geometric mean of their diagonals. 7 % is the 95 % uncertainty of measured added
-masses in roddy1990; three times that is no scatter but a wrong sign or another point."""
+masses in roddy1990. The second is judgement: three times that is no scatter but a wrong sign or another point."""
 
 IDENTITY_LIMIT = 0.30
-"""Xvr against -Yvdot: the boundary layer takes 20 to 30 % of the potential value, as it does of the Munk moment."""
+"""Xvr against -Yvdot. Judgement: the boundary layer takes 20 to 30 % of the Munk moment, and so about as much of it."""
 
 IDENTITY_SHARE, IDENTITY_WORST = 0.10, 0.50
-"""Xrr against -Yrdot, as a share of the axial load: their viscous part is of the size of the resistance's change."""
+"""Xrr against -Yrdot, as a share of the axial load. Judgement: the viscous part is a change of the resistance, and half
+of the axial load is more than any change of it."""
 
 PRINT_LIMIT, PRINT_WORST = 0.005, 0.10
-"""Cross terms printed beside M_A: three digits agree to half a per cent; a tenth is no rounding."""
+"""Cross terms printed beside M_A: three digits agree to half a per cent. Judgement: a tenth is no rounding."""
 
 
 def symmetry(s: Subject) -> Check:

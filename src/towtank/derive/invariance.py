@@ -68,7 +68,8 @@ def _power_std(s: Subject, nu: Array) -> float:
 
 ONE_LIFT, ONE_LIFT_WORST = 0.30, 1.0
 """Gap of Yur and Nuv, both without their potential part, over the Munk moment. Potential flow alone gives 0. Fins stand
-deeper in the wake in a drift than in a turn: 0.2 on SUBOFF with four fins (roddy1990), and half as much again here."""
+deeper in the wake in a drift than in a turn: 0.2 on SUBOFF with four fins (roddy1990). Judgement: half as
+much again."""
 
 
 def galilean(s: Subject) -> tuple[Check, ...]:

@@ -7,31 +7,33 @@ import numpy as np
 from towtank.derive.check import FAIL, PASS, SIGMAS, WARN, Check, Subject, gathered
 
 SWAY, SWAY_WORST = (0.5, 1.5), (0.3, 2.0)
-"""Added mass of sway over displaced mass: 0.5 for a sphere, 1 for a slender circular hull; fins add up to a half."""
+"""Added mass of sway over displaced mass: 0.5 for a sphere, 1 for a slender circular hull; fins add up to a half.
+Second band: judgement, what no craft of this kind has."""
 
 FLAT = 5.0
-"""The same for a body without 4-fold symmetry: pi b/4h of a flat section; 5 is a breadth of six heights."""
+"""The same for a body without 4-fold symmetry: pi b/4h of a flat section. Judgement: a breadth of six heights."""
 
 SURGE, SURGE_WORST = (0.3, 3.0), (0.1, 10.0)
 """Added mass of surge over that of Lamb's spheroid of the same length and diameter: blunt ends and fins up to double
-it; the wider band is one decimal."""
+it. Second band: judgement, a decimal point."""
 
 YAW, YAW_WORST = (0.02, 0.12), (0.01, 0.25)
 """Added inertia of yaw over displaced mass times length squared: 0.05 for slender ellipsoids, 0.083 for cylinders; a
-tail with fins adds up to a half, a full midbody takes away as much."""
+tail with fins adds up to a half, a full midbody takes away as much. Second band: judgement, twice as far."""
 
 ROLL = (0.3, 3.0)
-"""Added inertia of roll over the strip value of four fins, which leaves out the hull and the gaps."""
+"""Added inertia of roll over the strip value of four fins. Judgement: strips leave out the hull and the gaps."""
 
 CROSS_FLOW, CROSS_FLOW_WORST = (0.05, 1.6), (0.0, 3.2)
 """Cross-flow drag coefficient of the side view: 0.3 to 0.8 at small angles, 1.1 to 1.2 for a cylinder across the flow,
-2.0 for a flat plate (hoerner1965). 1.6 is a hull with large fins; nothing reaches 3.2."""
+2.0 for a flat plate (hoerner1965). Judgement: 1.6 is a hull with large fins; nothing reaches 3.2."""
 
 MUNK, MUNK_WORST = (0.1, 1.2), (-np.inf, 2.0)
-"""Nuv over Yvdot - Xudot: 0.7 to 0.8 for hulls, less with fins. Potential flow is the upper end."""
+"""Nuv over Yvdot - Xudot: 0.7 to 0.8 for hulls, less with fins. Judgement: potential flow and a fifth."""
 
 ARM, ARM_WORST = 1.0, 1.25
-"""Arms of the cross-flow force over the longest arm of the hull. Terms fitted at small angles also hold lift: 25 %."""
+"""Arms of the cross-flow force over the longest arm of the hull. Terms fitted at small angles also hold lift: 25 %,
+judgement."""
 
 PLANES = (
     ("Yvdot", "Nrdot", "Yvv", "Nvv", "Nrr", "Nuv", 1.0),
