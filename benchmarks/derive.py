@@ -31,7 +31,7 @@ from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import Drift, Heave, Pitch, Roll, Surge, Sway, Turn, Yaw
 from towtank.progress import Silent
 from towtank.provenance import provenance
-from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, TERMS
+from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, STANDING, TERMS
 from towtank.tank.lpm import LpmTank
 
 OSCILLATIONS, SAMPLES, PERIODS = 200, 500, 5
@@ -46,7 +46,7 @@ def campaign() -> list:
     craft = read_craft("hokie")
     U, L = craft.speed, craft.length
     rng = np.random.default_rng(1)
-    names = [name for name, term in TERMS.items() if not term.is_added_mass or name in FOURFOLD_ADDED_MASS]
+    names = [name for name in STANDING if not TERMS[name].is_added_mass or name in FOURFOLD_ADDED_MASS]
     values = {name: TERMS[name].prime_factor(1025.0, L, U) * float(rng.uniform(-0.01, -0.003)) for name in names}
     values |= {name: sign * values[base] for name, (base, sign) in FOURFOLD_TIES.items()}
     steady = [Drift(U, float(np.radians(a))) for a in range(-18, 19, 4)]

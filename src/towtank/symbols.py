@@ -18,6 +18,9 @@ RATES = ("u", "v", "w", "p", "q", "r")
 CONTROLS = ("dr", "de", "da", "dd")
 """Virtual rudder, elevator, aileron [rad] and the sum of squared fin angles [rad2]."""
 
+PER_SPEED = {"1/V": 1, "1/V2": 2}
+"""Factors that divide by a power of the speed through the water."""
+
 # What a factor contributes: (power of length, power of speed) in the prime system.
 _SCALE = {rate: (0, 1) for rate in "uvw"} | {rate: (-1, 1) for rate in "pqr"}
 
@@ -26,8 +29,8 @@ _SCALE = {rate: (0, 1) for rate in "uvw"} | {rate: (-1, 1) for rate in "pqr"}
 class Term:
     """One coefficient: ``load += value * product(factors)``.
 
-    factors : tokens out of RATES, ``|u|`` and the like, ``udot`` and the like, CONTROLS, and ``1/V2`` for
-        1/(u2 + v2 + w2).
+    factors : tokens out of RATES, ``|u|`` and the like, ``udot`` and the like, CONTROLS, and ``1/V`` and ``1/V2`` with
+        V2 = u2 + v2 + w2.
     """
 
     name: str
@@ -40,8 +43,8 @@ class Term:
         """Powers (a, b) such that value' = value / (0.5 rho L^a U^b)."""
         length, speed = (2 if self.load in "XYZ" else 3), 2
         for factor in self.factors:
-            if factor == "1/V2":
-                speed += 2
+            if factor in PER_SPEED:
+                speed += PER_SPEED[factor]
             elif factor not in CONTROLS:
                 base = _SCALE[factor.strip("|")[0]]
                 dot = (-1, 1) if factor.endswith("dot") else (0, 0)
@@ -52,7 +55,7 @@ class Term:
     def unit(self) -> str:
         """SI unit of the value; a power of the metre times kg, since every term is of second order in speed."""
         length, _ = self.powers
-        return {-1: "kg/m", 0: "kg", 1: "kg m", 2: "kg m2"}[length - 3] if length >= 2 else "kg/m2"
+        return {-1: "kg/m", 0: "kg", 1: "kg m", 2: "kg m2", 3: "kg m3"}[length - 3] if length >= 2 else "kg/m2"
 
     def prime_factor(self, density: float, length: float, speed: float) -> float:
         """What a dimensional value is divided by to give the primed one.
@@ -123,13 +126,48 @@ _FINS = [
     _t("Nuudr", "u |u| dr", "yaw moment of the rudder"),
 ]
 
-TERMS: dict[str, Term] = {term.name: term for term in [*_added_mass(), *_DAMPING, *_FINS]}
-"""The terms of perron eq. 2.13, 2.16 and 2.18 in consistent form, plus Xvvvv, Xwwww, Xvr, Xwq and Xqq.
+_THIRD = [
+    _t(f"{load}{''.join(product)}", f"{' '.join(product)} 1/V", f"{meaning}, third order in {' '.join(product)}")
+    for loads, rates in (("YN", "vr"), ("ZM", "wq"))
+    for load, meaning in zip(loads, {"Y": ("sway force", "yaw moment"), "Z": ("heave force", "pitch moment")}[loads[0]],
+                             strict=True)
+    for product in (rates[0] * 3, rates[0] * 2 + rates[1], rates[0] + rates[1] * 2, rates[1] * 3)
+]  # fmt: skip
+
+_EVEN = [
+    _t("Xuuvv", "u u v v 1/V2", "axial force due to sway, growing with u2"),
+    _t("Xuuww", "u u w w 1/V2", "axial force due to heave, growing with u2"),
+]
+
+OPTIONAL: dict[str, tuple[str, ...]] = {
+    "third-order": tuple(term.name for term in _THIRD),
+    "Xuuvv": tuple(term.name for term in _EVEN),
+}
+"""Groups of terms that a fit takes up only when asked, by the name of the group.
+
+"third-order"  Yvvv ... Mqqq: cubes of sway and yaw, heave and pitch, over the speed, as in the expansion of Abkowitz.
+               They bend the curve within the range and hold the mixed v v r that |v| v and |r| r leave out.
+"Xuuvv"        The Xuuvv, Xuuww of perron eq. 2.16 in even form: u2 v2 / V2 in place of the printed u2 |v| v. They stand
+               for Xvv and Xvvvv (Xww and Xwwww), whose difference they are in one plane: u2 v2 / V2 = v2 - v4 / V2.
+
+Source     fossen2021 (third-order odd expansion); perron, eq. 2.16; THEORY section 2.
+Departure  Divided by V or V2, so that each is of second order in speed, as all others are, and primes do not move.
+"""
+
+TERMS: dict[str, Term] = {term.name: term for term in [*_added_mass(), *_DAMPING, *_FINS, *_THIRD, *_EVEN]}
+"""The terms of perron eq. 2.13, 2.16 and 2.18 in consistent form, plus Xvvvv, Xwwww, Xvr, Xwq and Xqq; then those of
+``OPTIONAL``.
 
 Departure  The printed Xuuvv, Xuv, Xuuww, Xuw and Xur are odd in v, w or r, so port and starboard would differ; their
            even counterparts Xvv, Xww, Xrr stand here. Xvr, Xwq and Xqq carry what the reduced bracket of eq. 2.15
            leaves out of row 1. docs/decisions/0002 gives the reasons.
 """
+
+REPLACED: dict[str, tuple[str, ...]] = {"Xuuvv": ("Xvv", "Xvvvv", "Xww", "Xwwww")}
+"""Group of ``OPTIONAL`` -> terms that it stands in for."""
+
+STANDING = tuple(name for name in TERMS if not any(name in names for names in OPTIONAL.values()))
+"""The terms that every fit takes up: ``TERMS`` less those of ``OPTIONAL``."""
 
 FOURFOLD_TIES: dict[str, tuple[str, float]] = {
     "Zwdot": ("Yvdot", 1.0), "Zqdot": ("Yrdot", -1.0), "Mwdot": ("Nvdot", -1.0), "Mqdot": ("Nrdot", 1.0),
@@ -139,6 +177,13 @@ FOURFOLD_TIES: dict[str, tuple[str, float]] = {
     "Zuude": ("Yuudr", -1.0), "Muude": ("Nuudr", 1.0),
 }  # fmt: skip
 """Vertical-plane term -> (horizontal-plane term, sign) for a craft with 4-fold symmetry (THEORY section 3)."""
+
+OPTIONAL_TIES: dict[str, tuple[str, float]] = {
+    "Zwww": ("Yvvv", 1.0), "Zwwq": ("Yvvr", -1.0), "Zwqq": ("Yvrr", 1.0), "Zqqq": ("Yrrr", -1.0),
+    "Mwww": ("Nvvv", -1.0), "Mwwq": ("Nvvr", 1.0), "Mwqq": ("Nvrr", -1.0), "Mqqq": ("Nrrr", 1.0),
+    "Xuuww": ("Xuuvv", 1.0),
+}  # fmt: skip
+"""The same for the terms of ``OPTIONAL``."""
 
 FOURFOLD_ADDED_MASS = (
     "Xudot",

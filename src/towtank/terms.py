@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from towtank.frames import Array
-from towtank.symbols import CONTROLS, LOADS, RATES, TERMS, Term
+from towtank.symbols import CONTROLS, LOADS, PER_SPEED, RATES, TERMS, Term
 
 
 def reduced_coriolis_load(added: Array, nu: Array) -> Array:
@@ -48,8 +48,8 @@ def reduced_coriolis_load(added: Array, nu: Array) -> Array:
 
 
 def _factor(token: str, nu: Array, nudot: Array, control: Array) -> Array:
-    if token == "1/V2":
-        return np.asarray(1.0 / np.maximum((nu[:, :3] ** 2).sum(axis=1), 1e-12))
+    if token in PER_SPEED:
+        return np.asarray(np.maximum((nu[:, :3] ** 2).sum(axis=1), 1e-12) ** (-0.5 * PER_SPEED[token]))
     if token in CONTROLS:
         return np.asarray(control[:, CONTROLS.index(token)])
     if token.endswith("dot"):

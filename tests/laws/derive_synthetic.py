@@ -9,7 +9,7 @@ import numpy as np
 
 from towtank.plan.history import History
 from towtank.plan.motion import Drift, Heave, Incidence, Pitch, Roll, Surge, Sway, Turn, Yaw
-from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, TERMS
+from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, STANDING, TERMS
 from towtank.tank.run import Run
 from towtank.terms import term_loads
 
@@ -35,7 +35,7 @@ def coefficients(names, seed=0) -> dict[str, float]:
 
 
 def fourfold_coefficients(seed=0) -> dict[str, float]:
-    names = [n for n, t in TERMS.items() if (not t.is_added_mass or n in FOURFOLD_ADDED_MASS) and n not in ROLL]
+    names = [n for n in STANDING if (not TERMS[n].is_added_mass or n in FOURFOLD_ADDED_MASS) and n not in ROLL]
     values = coefficients(names, seed)
     for name, (base, sign) in FOURFOLD_TIES.items():
         values[name] = sign * values[base]

@@ -8,7 +8,7 @@ from towtank.craft.library import read_craft
 from towtank.derive.derive import derive
 from towtank.derive.select import allowed
 from towtank.plan.standard import standard_plan
-from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, TERMS
+from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, OPTIONAL, STANDING, TERMS
 from towtank.tank.campaign import tow
 from towtank.tank.lpm import LpmTank
 
@@ -55,7 +55,8 @@ def test_every_term_of_a_general_craft_comes_back(symmetry):
 
 
 def test_general_set_holds_every_term_of_the_symbol_table():
-    assert set(allowed("none")) == set(TERMS)
+    assert set(allowed("none")) == set(STANDING)
+    assert set(allowed("none", ("third-order",))) == {*STANDING, *OPTIONAL["third-order"]}
     assert {n for n in allowed("mirror") if TERMS[n].is_added_mass} == set(FOURFOLD_ADDED_MASS)
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import towtank
-from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, LOADS, RATES, TERMS, Term
+from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, LOADS, OPTIONAL_TIES, RATES, TERMS, Term
 from towtank.terms import regressor, term_loads
 
 POSITIVE = st.floats(0.1, 10.0)
@@ -63,11 +63,12 @@ def test_tied_terms_make_the_load_turn_with_the_motion(seed: int):
     Cross-flow terms in v|v| and w|w| obey it too: a quarter turn only exchanges and reflects the two planes.
     """
     rng = np.random.default_rng(seed)
-    own = [n for n in NAMES if n not in FOURFOLD_TIES and not n.startswith("K") and not n.endswith(("dr", "dd", "dot"))]
+    ties = FOURFOLD_TIES | OPTIONAL_TIES
+    own = [n for n in NAMES if n not in ties and not n.startswith("K") and not n.endswith(("dr", "dd", "dot"))]
     values = {name: rng.normal() for name in own}
     values |= {name: rng.normal() for name in ("Xudot", "Yvdot", "Kpdot", "Nrdot")}
     values["Yrdot"] = values["Nvdot"] = rng.normal()
-    values |= {name: sign * values[of] for name, (of, sign) in FOURFOLD_TIES.items() if of in values}
+    values |= {name: sign * values[of] for name, (of, sign) in ties.items() if of in values}
     nu, nudot = _motion(seed + 1000)
     still = np.zeros((5, 4))
     np.testing.assert_allclose(

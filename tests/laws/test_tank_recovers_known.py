@@ -4,7 +4,7 @@ import numpy as np
 
 from towtank.craft.library import read_craft
 from towtank.plan.standard import standard_plan
-from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, TERMS
+from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, STANDING, TERMS
 from towtank.tank.campaign import tow
 from towtank.tank.lpm import LpmTank
 from towtank.terms import columns
@@ -15,7 +15,7 @@ HOKIE = read_craft("hokie")
 def known():
     """Values of either sign and unlike sizes for every term that a 4-fold craft has, with its ties."""
     random = np.random.default_rng(5)
-    names = [n for n, t in TERMS.items() if not t.is_added_mass or n in FOURFOLD_ADDED_MASS]
+    names = [n for n in STANDING if not TERMS[n].is_added_mass or n in FOURFOLD_ADDED_MASS]
     values = {name: float(random.uniform(0.5, 2.0) * random.choice([-1.0, 1.0])) for name in names}
     return values | {name: sign * values[twin] for name, (twin, sign) in FOURFOLD_TIES.items()}
 

@@ -12,7 +12,7 @@ from towtank.errors import InputError, PlanError
 from towtank.plan.limits import assess
 from towtank.plan.motion import sampled
 from towtank.plan.standard import standard_plan
-from towtank.symbols import TERMS
+from towtank.symbols import STANDING
 from towtank.terms import columns
 
 HOKIE = read_craft("hokie")
@@ -26,10 +26,10 @@ def odd_craft():
 
 
 @pytest.mark.parametrize("name", library_names())
-def test_library_crafts_have_a_plan_without_warnings_of_at_most_110_runs(name):
+def test_library_crafts_have_a_plan_without_warnings_of_at_most_115_runs(name):
     craft = read_craft(name)
     plan = standard_plan(craft)
-    assert len(plan.tests) <= 110
+    assert len(plan.tests) <= 115
     assert len({test.name for test in plan.tests}) == len(plan.tests)
     for test in plan.tests:
         violence = assess(test, craft)
@@ -81,11 +81,12 @@ def test_a_bare_hull_has_no_fin_runs():
 def test_every_term_but_xwq_is_determined_without_symmetry_ties():
     """The regressors of the plan, each scaled to unit length, are independent: no term hides behind another.
 
-    Xwq needs heave and pitch together, which no run of the source combines; the plan says so.
+    Xwq needs heave and pitch together, which no run of the source combines; the plan says so. Optional terms are left
+    out: those of the vertical plane need it too.
     """
     craft = odd_craft()
     assert any("Xwq" in note for note in standard_plan(craft).notes)
-    names = [name for name in TERMS if name != "Xwq"]
+    names = [name for name in STANDING if name != "Xwq"]
     rows = []
     for test in standard_plan(craft, 1.0).tests:
         history = sampled(test)

@@ -22,7 +22,10 @@ X_FINS, Y_FINS = (225.0, 315.0, 135.0, 45.0), (180.0, 300.0, 60.0)
 CROSS = {"Kuv": 3.0, "Kvv": -2.0, "Kur": 1.5, "Krr": -4.0, "Kpp": -200.0, "Kvdot": 9.0, "Ypdot": 9.0, "Zudot": 5.0,
          "Xwdot": 5.0, "Npdot": -7.0, "Krdot": -7.0, "Mudot": 4.0, "Xqdot": 4.0}  # fmt: skip
 """Terms of a craft without planes of symmetry, SI."""
-CASES = ("lumped", "split", "screw", "three fins")
+OPTIONAL = {"Xuuvv": 40.0, "Yvvv": -300.0, "Yvvr": 200.0, "Yvrr": -150.0, "Yrrr": 90.0, "Nvvv": 120.0, "Nvrr": -400.0,
+            "Nrrr": -900.0, "Zwww": -300.0, "Zwqq": -150.0, "Mwwq": -210.0, "Mqqq": -900.0}  # fmt: skip
+"""Some terms that a fit takes up only when asked, SI."""
+CASES = ("lumped", "split", "screw", "three fins", "optional")
 
 
 @cache
@@ -41,7 +44,7 @@ def model(name):
     mass = replace(plain.craft.mass, cg=(0.0005, 0.0003, 0.0508), inertia=inertia)
     craft = replace(plain.craft, fins=fins, mass=mass, propeller=SCREW if name == "screw" else plain.craft.propeller)
     d = plain.derivatives
-    values = {name: d[name] for name in d.names} | CROSS
+    values = {name: d[name] for name in d.names} | CROSS | (OPTIONAL if name == "optional" else {})
     made = Model.from_values(craft, values, options=plain.options)
     return replace(made, derivatives=to_variant(made.derivatives, "split")) if name == "split" else made
 

@@ -7,7 +7,7 @@ from towtank.derive.convert import about_point, rigid_shift, transformation
 from towtank.derive.show import origin_primes, primes
 from towtank.derive.table import Derivatives, Reference
 from towtank.frames import move_load, move_velocity
-from towtank.symbols import TERMS
+from towtank.symbols import STANDING, TERMS
 from towtank.terms import term_loads
 
 QUADRATIC = ("Yvv", "Yrr", "Zww", "Zqq", "Mww", "Mqq", "Nvv", "Nrr", "Kvv", "Krr", "Xvvvv", "Xwwww")
@@ -26,7 +26,7 @@ def build(values, **extra) -> Derivatives:
 
 def random_set(skip=()):
     rng = np.random.default_rng(1)
-    values = {n: rng.uniform(-10, 10) for n in TERMS if n not in skip}
+    values = {n: rng.uniform(-10, 10) for n in STANDING if n not in skip}
     for i, load in enumerate("XYZKMN"):
         for j in range(i):
             values[f"{load}{'uvwpqr'[j]}dot"] = values[f"{'XYZKMN'[j]}{'uvwpqr'[i]}dot"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +18,8 @@ from towtank.terms import term_loads
 NOTE = (
     "Added mass, linear, fin and second-order axial terms are moved exactly (ahead, u > 0). Yvv, Nvv, Zww, Mww and "
     "Yrr, Nrr, Zqq, Mqq are those of pure sway (heave) and pure yaw (pitch) about the new point; their mixture "
-    "v|r|, |v|r has no term in the model and stays behind. Xvvvv, Xwwww, Kvv and Krr are kept."
+    "v|r|, |v|r has no term in the model and stays behind. Xvvvv, Xwwww, Xuuvv, Xuuww, Kvv and Krr are kept. "
+    "Third-order terms move exactly but for the speed they are divided by, which changes by r times the shift."
 )
 
 
@@ -59,7 +61,7 @@ def transformation(names: Sequence[str], shift: float) -> tuple[tuple[str, ...],
         full[index[name], index[name]] = 1.0
         if term.is_added_mass:
             _move_added_mass(full, index, name, shift)
-    for new, old, factor in _rules(shift):
+    for new, old, factor in (*_rules(shift), *_cubic_rules(shift)):
         full[index[new], index[old]] += factor
     picked = full[:, [index[name] for name in names]]
     kept = [i for i, name in enumerate(TERMS) if np.any(picked[i] != 0.0)]
@@ -98,6 +100,19 @@ def _rules(s: float) -> list[tuple[str, str, float]]:
         ("Nvv", "Yvv", -s), ("Yrr", "Yvv", -a), ("Nrr", "Nvv", -a), ("Nrr", "Yrr", -s), ("Nrr", "Yvv", s * a),
         ("Mww", "Zww", s), ("Zqq", "Zww", a), ("Mqq", "Mww", a), ("Mqq", "Zqq", s), ("Mqq", "Zww", s * a),
     ]  # fmt: skip
+
+
+def _cubic_rules(s: float) -> Iterator[tuple[str, str, float]]:
+    """As ``_rules``, for the third-order terms: (v + t r)^(3-k) r^k about the new point; t = -s, and t = s for w, q."""
+    for force, moment, a, b, t in (("Y", "N", "v", "r", -s), ("Z", "M", "w", "q", s)):
+        cubes = [a * (3 - k) + b * k for k in range(4)]
+        for k, old in enumerate(cubes):
+            for j in range(4 - k):
+                share, new = math.comb(3 - k, j) * t**j, cubes[k + j]
+                if j:
+                    yield f"{force}{new}", f"{force}{old}", share
+                    yield f"{moment}{new}", f"{moment}{old}", share
+                yield f"{moment}{new}", f"{force}{old}", t * share
 
 
 def _moved(d: Derivatives, shift: float) -> Derivatives:

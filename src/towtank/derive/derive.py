@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from statistics import mode
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from towtank.derive import quality, weights
 from towtank.derive.convert import about_point
 from towtank.derive.cycles import settled
-from towtank.derive.expand import expand
+from towtank.derive.expand import Expansion, expand
 from towtank.derive.fourier import fourier
 from towtank.derive.identify import identify
-from towtank.derive.origin import origin_slopes
+from towtank.derive.mesh import mesh_covariance
+from towtank.derive.origin import Origin, origin_slopes
 from towtank.derive.screen import DRIFT_LIMIT_DEG, FIN_LIMIT_DEG, name_of, screen
 from towtank.derive.table import Derivatives, Reference
+from towtank.derive.verdicts import Judged, Verdict, judged
+from towtank.frames import Array
 from towtank.provenance import provenance
 from towtank.tank.run import Run
+
+if TYPE_CHECKING:
+    from towtank.grid.study import GridStudy
 
 
 def derive(
@@ -27,17 +35,23 @@ def derive(
     about: float | None = None,
     length: float | None = None,
     mix_levels: bool = False,
+    screening: bool = True,
+    grid: GridStudy | None = None,
+    optional: Sequence[str] = (),
 ) -> Derivatives:
     """Derivatives of a craft from its captive runs.
 
     Parameters
     ----------
     runs : of one craft, in one water, about one origin.
-    weight_steady : lambda, the share of steady drift (incidence) against sway (heave); 0.7 by default, the value for
-        L/D > 8; give 0.5 for fuller craft. ``quality["sensitivity"]`` shows what 0, 0.5 and 1 would give.
+    weight_steady : lambda, the share of steady drift (incidence) against sway (heave); by default 0.7 for L/D > 8 and
+        0.5 for fuller craft. ``quality["sensitivity"]`` shows what 0, 0.5 and 1 would give.
     about : distance aft of the nose [m] of the point the result refers to; the runs' origin by default.
     length : reference length [m] of the primed values; the runs' by default.
     mix_levels : allow runs of several levels of evidence in one fit.
+    screening : test every run against the fit to the others; without it, only the range of the model decides.
+    grid : study of the runs' meshes, whose uncertainty enters the weights and the covariance ``mesh``.
+    optional : groups of ``symbols.OPTIONAL`` to fit as well: "third-order", "Xuuvv".
 
     Returns
     -------
@@ -47,50 +61,99 @@ def derive(
     ------
     DeriveError
         No runs, numbers that are not finite, runs that do not belong together, or nothing that can be identified.
+    InputError
+        A grid study of another craft, level or mesh.
 
     Source     perron, sections 2.2 and 2.3; THEORY sections 2 to 4.
     Departure  One regression on all samples in place of formulae per test; docs/derive.md.
     Valid      Drift to 20 deg, fins to 20 deg, ahead.
     """
-    share = weights.WEIGHT_STEADY if weight_steady is None else float(weight_steady)
-    kept, rejected = screen(tuple(runs), mix_levels)
-    samples = settled(kept)
-    solved = identify(kept, samples, share)
+    within, outside = screen(tuple(runs), mix_levels)
+    share = weights.default_share(within) if weight_steady is None else float(weight_steady)
+    mesh = _mesh(grid, within)
+    found = judged(within, share, mesh, optional) if screening else _unjudged(within, share, mesh, optional)
+    return about_point(_derivatives(_Fitted(tuple(runs), outside, found, share, mesh)), about, length)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """What a set of derivatives is made of. outside : (name, reason) of the runs beyond the range of the model."""
+
+    given: tuple[Run, ...]
+    outside: tuple[tuple[str, str], ...]
+    judged: Judged
+    share: float
+    mesh: Array | None
+
+
+def _mesh(grid: GridStudy | None, runs: Sequence[Run]) -> Array | None:
+    if grid is None:
+        return None
+    from towtank.grid.spread import mesh_uncertainty
+
+    return mesh_uncertainty(grid, runs)
+
+
+def _unjudged(runs: tuple[Run, ...], share: float, mesh: Array | None, optional: Sequence[str]) -> Judged:
+    samples = settled(runs)
+    return Judged(runs, samples, identify(runs, samples, share, mesh=mesh, optional=optional), {}, mesh)
+
+
+def _derivatives(it: _Fitted) -> Derivatives:
+    runs, samples, solved = it.judged.runs, it.judged.samples, it.judged.solved
     unknowns = solved.fit.unknowns
-    expansion = expand(solved.choice, kept[0].symmetry, unknowns[:, 0], solved.covariance)
+    expansion = expand(solved.choice, runs[0].symmetry, unknowns[:, 0], solved.covariance)
     members = expansion.matrix @ unknowns
     spread = members[:, 1:] - members[:, :1]
-    names = [name_of(run, kept) for run in kept]
-    origin = origin_slopes(kept, samples, dict(zip(expansion.names, members, strict=True)))
+    names = [name_of(run, it.given) for run in runs]
+    origin = origin_slopes(runs, samples, dict(zip(expansion.names, members, strict=True)))
     flat = np.zeros((len(members), len(members)))
-    result = Derivatives(
-        craft=kept[0].craft,
-        level=" + ".join(sorted({run.level for run in kept})),
+    return Derivatives(
+        craft=runs[0].craft,
+        level=" + ".join(sorted({run.level for run in runs})),
         variant="lumped",
-        reference=Reference(kept[0].length, mode(run.speed for run in kept), kept[0].density, kept[0].origin_from_nose),
+        reference=Reference(runs[0].length, mode(run.speed for run in runs), runs[0].density, runs[0].origin_from_nose),
         names=expansion.names,
         values=members[:, 0],
         covariance_fit=expansion.matrix @ solved.covariance @ expansion.matrix.T,
-        covariance_mesh=flat,
-        covariance_model=spread @ spread.T / spread.shape[1] if spread.shape[1] else flat.copy(),
+        covariance_mesh=mesh_covariance(runs, solved, expansion, it.judged.mesh),
+        covariance_model=spread @ spread.T / spread.shape[1] if spread.shape[1] else flat,
         runs=quality.rests_on(expansion, solved, names),
-        rejected=rejected,
+        rejected=(*it.outside, *it.judged.rejected),
         origin=origin.values,
         origin_std=origin.std,
-        quality={
-            "weight_steady": share,
-            "range_deg": DRIFT_LIMIT_DEG,
-            "fins_range_deg": FIN_LIMIT_DEG,
-            "runs": len(kept),
-            "samples": int(samples.run.size),
-            **quality.summary(kept, names, samples, solved, expansion),
-            "origin": {
-                "method": origin.method,
-                "order": list(origin.values),
-                "covariance": origin.covariance.tolist(),
-            },
-            "fourier": fourier(kept, samples),
-        },
-        provenance=provenance({name: run.id for name, run in zip(names, kept, strict=True)}),
+        quality=_quality(it, names, expansion, origin),
+        provenance=provenance({name: run.id for name, run in zip(names, runs, strict=True)}),
     )
-    return about_point(result, about, length)
+
+
+def _quality(it: _Fitted, names: Sequence[str], expansion: Expansion, origin: Origin) -> dict[str, Any]:
+    runs, samples = it.judged.runs, it.judged.samples
+    return {
+        "weight_steady": it.share,
+        "range_deg": DRIFT_LIMIT_DEG,
+        "fins_range_deg": FIN_LIMIT_DEG,
+        "runs": len(runs),
+        "samples": int(samples.run.size),
+        "screening": _screening(it),
+        **quality.summary(runs, names, samples, it.judged.solved, expansion),
+        "origin": {
+            "method": origin.method,
+            "order": list(origin.values),
+            "covariance": origin.covariance.tolist(),
+        },
+        "fourier": fourier(runs, samples),
+    }
+
+
+def _screening(it: _Fitted) -> dict[str, Any]:
+    """Run -> verdict as plain content, in the order of the runs given: of all of them, or none without screening."""
+    if not it.judged.verdicts:
+        return {}
+    why = dict(it.outside)
+    exploratory = {name_of(run, it.given) for run in it.given if run.exploratory}
+    beyond = {
+        name: Verdict("exploratory" if name in exploratory else "rejected", 0.0, reason) for name, reason in why.items()
+    }
+    found = {**beyond, **it.judged.verdicts}
+    return {name: found[name].document() for name in (name_of(run, it.given) for run in it.given)}

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from towtank.derive import weights
-from towtank.derive.cycles import Samples, family_of
-from towtank.derive.regress import Fit, Units, block_covariance, solve
+from towtank.derive.cycles import Samples
+from towtank.derive.regress import Covariance, Fit, block_jackknife, solve
+from towtank.derive.robust import Loss
 from towtank.derive.select import Choice, choose, independent
 from towtank.derive.system import System, build
 from towtank.errors import DeriveError
@@ -52,6 +53,9 @@ def identify(
     *,
     trust: Array | None = None,
     mesh: Array | None = None,
+    optional: Sequence[str] = (),
+    covariance: Covariance = block_jackknife,
+    loss: Loss | None = None,
 ) -> Solved:
     """Choose the terms, weigh the runs by what is left of a first unweighted fit, solve, and gate the roll terms.
 
@@ -60,25 +64,28 @@ def identify(
     weight_steady : lambda.   trust (R,) : factor on the weight of each run, 0 < t <= 1; None for ones.
     mesh (R, 6) : standard discretisation uncertainty of each load of each run [N, N m]; its square adds to the square
         of the residual that sets the weight. None where no grid study was made.
+    optional : groups of ``symbols.OPTIONAL`` that are fitted as well.
+    covariance : estimator out of ``regress``.   loss : ``robust.huber`` for a first fit that bad runs do not pull, and
+        weights that fall with their residual in it; None for least squares.
 
     Raises
     ------
     DeriveError
         The runs excite nothing, ``weight_steady`` is outside 0..1, or ``trust`` is outside 0..1.
     """
-    choice, system = assemble(runs, samples)
-    return fitted(runs, choice, system, weight_steady, trust=trust, mesh=mesh)
+    choice, system = assemble(runs, samples, optional)
+    return fitted(runs, choice, system, weight_steady, trust=trust, mesh=mesh, covariance=covariance, loss=loss)
 
 
-def assemble(runs: Sequence[Run], samples: Samples) -> tuple[Choice, System]:
-    """The terms that the runs tell apart, and their linear system.
+def assemble(runs: Sequence[Run], samples: Samples, optional: Sequence[str] = ()) -> tuple[Choice, System]:
+    """The terms that the runs tell apart, and their linear system; ``optional`` as in ``identify``.
 
     Raises
     ------
     DeriveError
         The runs excite nothing.
     """
-    choice = choose(runs, samples)
+    choice = choose(runs, samples, optional)
     if not choice.unknowns:
         raise DeriveError(
             "derive: the runs excite no term of the model. Give runs with speed, drift or an oscillation."
@@ -97,6 +104,8 @@ def fitted(
     *,
     trust: Array | None = None,
     mesh: Array | None = None,
+    covariance: Covariance = block_jackknife,
+    loss: Loss | None = None,
 ) -> Solved:
     """The regression of a system of ``assemble``: weights, solution, gates, covariance. Arguments as in ``identify``.
 
@@ -106,19 +115,20 @@ def fitted(
         ``weight_steady`` or ``trust`` is outside 0..1.
     """
     factor = _trust(runs, trust)
-    scale = weights.load_scale(system)
-    first = solve(system, 1.0 / (system.count[:, None] * scale**2))
-    spread = weights.spread(system, runs, first.unknowns[:, 0])
+    plain = 1.0 / (system.count[:, None] * weights.load_scale(system) ** 2)
+    lowered = np.ones_like(plain) if loss is None else loss(system, plain)
+    first = solve(system, plain * lowered)
+    spread = weights.spread(system, runs, first.unknowns[:, 0]) / np.sqrt(lowered)
     if mesh is not None:
         spread = np.hypot(spread, mesh)
     share = weights.family(system, runs, weight_steady) * factor[:, None]
-    solved = weighted(runs, choice, system, spread, share)
+    solved = weighted(choice, system, spread, share, covariance)
     gated = _gate(solved, runs[0].symmetry)
     out = {name: str(entry["why"]) for name, entry in gated.items() if not entry["in_model"]}
     if out:
         left = [i for i, name in enumerate(system.names) if name not in out]
         choice, system = choice.keep([system.names[i] for i in left], out), system.keep(left)
-        solved = weighted(runs, choice, system, spread, share)
+        solved = weighted(choice, system, spread, share, covariance)
     return replace(solved, gated=gated, trust=factor)
 
 
@@ -133,7 +143,9 @@ def _trust(runs: Sequence[Run], trust: Array | None) -> Array:
     return factor
 
 
-def weighted(runs: Sequence[Run], choice: Choice, system: System, spread: Array, share: Array) -> Solved:
+def weighted(
+    choice: Choice, system: System, spread: Array, share: Array, covariance: Covariance = block_jackknife
+) -> Solved:
     """Solve with given spread and family weight (R, 6), with the covariance of independent blocks."""
     weight = share / spread**2
     fit = solve(system, weight)
@@ -141,11 +153,9 @@ def weighted(runs: Sequence[Run], choice: Choice, system: System, spread: Array,
     misfit = float(squares.sum() / (share * system.count[:, None]).sum())
     whole = _repeats(system, weight, squares)
     block = system.run if whole else system.run * (int(system.period.max()) + 1) + system.period
-    kinds = sorted({family_of(run) for run in runs if run.steady})
-    pool = np.array([kinds.index(family_of(run)) if run.steady else -1 for run in runs], dtype=np.intp)
-    covariance, blocks = block_covariance(fit, Units(block, system.load, pool[system.run]), misfit)
+    estimate, blocks = covariance(fit, block, misfit), len(np.unique(block))
     unit = "run" if whole else "run and period"
-    return Solved(choice, system, share, spread, weight, fit, covariance, blocks, unit)
+    return Solved(choice, system, share, spread, weight, fit, estimate, blocks, unit)
 
 
 def _repeats(system: System, weight: Array, squares: Array) -> bool:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import stdtrit
+from scipy.special import ndtri, stdtrit
 
 from towtank.derive.system import System
 from towtank.frames import Array
 
 LEVERAGE = 0.99
 """A direction that owes more than this share of its information to one block has no residual to judge it by."""
-
-POOLED = 0.5
-"""Weight of the variance pooled over the steady runs of one kind, against that of the runs one by one."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,10 @@ class Fit:
     scale: Array
     weighted: Array
     error: Array
+
+
+Covariance = Callable[[Fit, NDArray[np.intp], float], Array]
+"""An estimator of the covariance of a fit: its rows, the block of each row, the mean square misfit."""
 
 
 def solve(system: System, weight: Array) -> Fit:
@@ -56,43 +58,76 @@ def solve(system: System, weight: Array) -> Fit:
     return Fit(solution / scale[:, None], condition, r, scale, scaled, error)
 
 
-@dataclass(frozen=True)
-class Units:
-    """The independent units of the data, row by row. block (rows,) : the unit; load (rows,) : which of the six loads.
+def block_jackknife(fit: Fit, block: NDArray[np.intp], misfit: float) -> Array:
+    """Covariance (n, n) of the nominal unknowns from what each block changes when it is left out.
 
-    pool (rows,) : number of the kind of a steady run, -1 for an oscillation. A steady run is a single condition, so
-    the runs of one kind share half of an error covariance; an oscillation is judged by its own cycles.
-    """
+    The sum over blocks of the squared change of the result, times (G - 1) / G. Samples within a block may be
+    correlated in any way, and the blocks may differ in size and in scatter. A direction that rests on one block alone
+    has no such change; it gets ``misfit``, with the block counted as one observation.
 
-    block: NDArray[np.intp]
-    load: NDArray[np.intp]
-    pool: NDArray[np.intp]
-
-
-def block_covariance(fit: Fit, units: Units, misfit: float) -> tuple[Array, int]:
-    """Covariance (n, n) of the nominal unknowns and the number of independent blocks.
-
+    Parameters
+    ----------
+    block (rows,) : the independent unit of each row.
     misfit : weighted mean square residual of the whole fit, used where no residual is left to judge by.
 
-    Oscillations: the block jackknife, the sum over blocks of the squared change of the result when that block is left
-    out, times (G - 1) / G. Samples within a block may be correlated in any way. A direction that rests on one block
-    alone has no such change; it gets ``misfit``, with the block counted as one observation. Steady runs: the mean of
-    the jackknife over runs and of the residual covariance of their kind over its degrees of freedom.
-
     Source     bellmccaffrey2002 (their jackknife form, CR3); cameronmiller2015, section VI.
-    Departure  Steady runs are half pooled by kind: the jackknife alone is erratic where a term rests on a few of them
-               (Xvr on four turns), the pool alone is wrong where their errors grow with the load (fins).
     Valid      Blocks independent of each other. Few blocks: widened by Student's factor.
     """
+    white, back = _whitened(fit)
+    total = np.zeros((len(back), len(back)))
+    blocks = _rows_of(block)
+    factor = max(len(blocks) - 1, 1) / len(blocks)
+    for at in blocks:
+        own = white[at]
+        share, axes = np.linalg.eigh(own.T @ own)
+        alone = share > LEVERAGE
+        inflate = np.where(alone, 0.0, 1.0 / (1.0 - np.where(alone, 0.0, share)))
+        change = axes @ (inflate * (axes.T @ (own.T @ fit.error[at])))
+        total += factor * np.outer(change, change)
+        total += misfit * (axes[:, alone] * share[alone]) @ axes[:, alone].T
+    widen = _student(back @ white.T, block)
+    return np.asarray(back @ total @ back.T * np.outer(widen, widen))
+
+
+def cluster_sandwich(fit: Fit, block: NDArray[np.intp], misfit: float) -> Array:
+    """Covariance (n, n) of the nominal unknowns from the score of each block, times G / (G - 1) (N - 1) / (N - n).
+
+    What econometric programs call cluster-robust; with one row in a block it is HC0 times that factor. It knows nothing
+    of leverage, so it is too small where a term rests on few blocks. ``misfit`` is not used.
+
+    Source     cameronmiller2015, section II (the estimator and its correction).
+    Valid      Many blocks, none with a large share of the information.
+    """
+    white, back = _whitened(fit)
+    scores = np.array([white[at].T @ fit.error[at] for at in _rows_of(block)])
+    groups, rows, n = len(scores), *white.shape
+    factor = groups / max(groups - 1, 1) * (rows - 1) / max(rows - n, 1)
+    return np.asarray(factor * back @ (scores.T @ scores) @ back.T)
+
+
+def homoscedastic(fit: Fit, block: NDArray[np.intp], misfit: float) -> Array:
+    """Covariance (n, n) of the nominal unknowns of plain weighted least squares: every row alike and independent.
+
+    ``block`` and ``misfit`` are not used: the mean square of the rows themselves, over their degrees of freedom.
+
+    Source     jcgm100, annex H.3 (least squares).
+    Valid      Weights are right and rows are independent. For comparison.
+    """
+    rows, n = fit.weighted.shape
+    _, back = _whitened(fit)
+    return np.asarray(float(fit.error @ fit.error) / max(rows - n, 1) * back @ back.T)
+
+
+def _whitened(fit: Fit) -> tuple[Array, Array]:
+    """Rows (rows, n) with orthonormal columns, and the matrix (n, n) from whitened unknowns to those of the system."""
     white = solve_triangular(fit.root, fit.weighted.T, trans="T").T
-    total = _jackknife(white, fit.error, units.block, units.pool < 0, misfit)
-    total += (1.0 - POOLED) * _jackknife(white, fit.error, units.block, units.pool >= 0, misfit)
-    for pool in np.unique(units.pool[units.pool >= 0]):
-        at = units.pool == pool
-        total += POOLED * _pooled(white[at], fit.error[at], units.block[at], units.load[at], misfit)
-    back = solve_triangular(fit.root, np.eye(len(fit.scale))) / fit.scale[:, None]
-    widen = _student(back @ white.T, units.block)
-    return back @ total @ back.T * np.outer(widen, widen), len(np.unique(units.block))
+    return white, solve_triangular(fit.root, np.eye(len(fit.scale))) / fit.scale[:, None]
+
+
+def _rows_of(block: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Numbers of the rows of each block."""
+    order = np.argsort(block, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(block[order])) + 1)
 
 
 def _student(influence: Array, block: NDArray[np.intp]) -> Array:
@@ -103,42 +138,7 @@ def _student(influence: Array, block: NDArray[np.intp]) -> Array:
 
     Source     jcgm100, annex G (Student factor); cameronmiller2015, section VI (effective number of clusters).
     """
-    _, where = np.unique(block, return_inverse=True)
-    share = np.zeros((where.max() + 1, len(influence)))
-    np.add.at(share, where, influence.T**2)
+    share = np.array([(influence[:, at] ** 2).sum(axis=1) for at in _rows_of(block)])
     share /= np.maximum(share.sum(axis=0), 1e-300)
     freedom = np.maximum(1.0 / np.maximum((share**2).sum(axis=0), 1e-12) - 1.0, 2.0)
-    return np.asarray(stdtrit(freedom, 0.975) / 1.959964)
-
-
-def _jackknife(white: Array, error: Array, block: NDArray[np.intp], rows: NDArray[np.bool_], misfit: float) -> Array:
-    """Covariance (n, n) of the whitened unknowns from the blocks of the oscillations."""
-    n = white.shape[1]
-    total = np.zeros((n, n))
-    numbers = np.unique(block[rows])
-    factor = max(len(numbers) - 1, 1) / max(len(numbers), 1)
-    order = np.flatnonzero(rows)[np.argsort(block[rows], kind="stable")]
-    edges = np.searchsorted(block[order], numbers)
-    for at in np.split(order, edges[1:]) if len(numbers) else []:
-        own = white[at]
-        share, axes = np.linalg.eigh(own.T @ own)
-        alone = share > LEVERAGE
-        inflate = np.where(alone, 0.0, 1.0 / (1.0 - np.where(alone, 0.0, share)))
-        change = axes @ (inflate * (axes.T @ (own.T @ error[at])))
-        total += factor * np.outer(change, change)
-        total += misfit * (axes[:, alone] * share[alone]) @ axes[:, alone].T
-    return total
-
-
-def _pooled(white: Array, error: Array, block: NDArray[np.intp], load: NDArray[np.intp], misfit: float) -> Array:
-    """Covariance (n, n) of the whitened unknowns from the steady runs of one kind, six loads each."""
-    numbers, run = np.unique(block, return_inverse=True)
-    rows = np.zeros((len(numbers), 6, white.shape[1]))
-    errors = np.zeros((len(numbers), 6))
-    rows[run, load], errors[run, load] = white, error
-    freedom = np.bincount(load, minlength=6) - np.bincount(load, weights=(white**2).sum(axis=1), minlength=6)
-    judged = freedom > 0.5
-    root = np.where(judged, 1.0 / np.sqrt(np.where(judged, freedom, 1.0)), 0.0)
-    common = (errors.T @ errors) * np.outer(root, root)
-    common[np.diag_indices(6)] += np.where(judged, 0.0, misfit)
-    return np.asarray(np.einsum("bkn,kl,blm->nm", rows, common, rows, optimize=True))
+    return np.asarray(stdtrit(freedom, 0.975) / ndtri(0.975))

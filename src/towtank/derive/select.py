@@ -8,8 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from towtank.derive.cycles import Samples
+from towtank.errors import DeriveError
 from towtank.frames import Array, drift_angle, incidence_angle
-from towtank.symbols import FOURFOLD_ADDED_MASS, FOURFOLD_TIES, LOADS, RATES, TERMS, Term
+from towtank.symbols import (
+    FOURFOLD_ADDED_MASS,
+    FOURFOLD_TIES,
+    LOADS,
+    OPTIONAL,
+    OPTIONAL_TIES,
+    PER_SPEED,
+    RATES,
+    REPLACED,
+    STANDING,
+    TERMS,
+    Term,
+)
 from towtank.tank.run import Run
 
 GATED = ("Kuv", "Kvv", "Kur", "Krr")
@@ -51,14 +64,22 @@ class Choice:
         return Choice(tuple(unknowns), members, self.left_out | gone)
 
 
-def allowed(symmetry: str) -> tuple[str, ...]:
+def allowed(symmetry: str, optional: Sequence[str] = ()) -> tuple[str, ...]:
     """Terms that the symmetry of the craft leaves non-zero, the gated roll terms included.
+
+    optional : groups of ``symbols.OPTIONAL`` that take part.
 
     Source     perron, eq. 2.13, 2.16, 2.18.
     Departure  The printed zero pattern of eq. 2.13 is not symmetric; here an entry stands when both its load and its
                acceleration keep the planes of symmetry (lamb1932: M_A is symmetric).
     """
-    return tuple(name for name, term in TERMS.items() if not term.is_added_mass or _entry(term, symmetry))
+    replaced = {name for group in optional for name in REPLACED.get(group, ())}
+    names = (*STANDING, *(name for group in optional for name in OPTIONAL[group]))
+    return tuple(
+        name
+        for name in names
+        if name not in replaced and (not TERMS[name].is_added_mass or _entry(TERMS[name], symmetry))
+    )
 
 
 def _entry(term: Term, symmetry: str) -> bool:
@@ -69,11 +90,19 @@ def _entry(term: Term, symmetry: str) -> bool:
     return True
 
 
-def choose(runs: Sequence[Run], samples: Samples) -> Choice:
-    """Terms that the craft's symmetry allows and that the kinds of motion present excite."""
+def choose(runs: Sequence[Run], samples: Samples, optional: Sequence[str] = ()) -> Choice:
+    """Terms that the craft's symmetry allows and that the kinds of motion present excite; ``optional`` as above.
+
+    Raises
+    ------
+    DeriveError
+        A group of optional terms that does not exist.
+    """
+    if stray := [group for group in optional if group not in OPTIONAL]:
+        raise DeriveError(f"derive: no optional terms {stray[0]!r}. Groups are {', '.join(OPTIONAL)}.")
     symmetry = runs[0].symmetry
-    names = allowed(symmetry)
-    ties = FOURFOLD_TIES if symmetry == "fourfold" else {}
+    names = allowed(symmetry, optional)
+    ties = FOURFOLD_TIES | OPTIONAL_TIES if symmetry == "fourfold" else {}
     reach = _reach(samples, runs)
     left_out: dict[str, str] = {}
     members: dict[str, tuple[str, float]] = {}
@@ -95,12 +124,17 @@ def choose(runs: Sequence[Run], samples: Samples) -> Choice:
 def _precedence(name: str) -> tuple[int, int]:
     """Lower orders come first, so that a higher one is dropped when the two cannot be told apart."""
     term = TERMS[name]
-    late = 3 if name in GATED else 2 if "1/V2" in term.factors else 0 if term.is_added_mass or "u" in name[1:] else 1
+    if name in GATED:
+        late = 3
+    elif not PER_SPEED.keys().isdisjoint(term.factors):
+        late = 2
+    else:
+        late = 0 if term.is_added_mass or "u" in name[1:] else 1
     return late, list(TERMS).index(name)
 
 
 def _tokens(term: Term) -> list[str]:
-    return list(dict.fromkeys(token.strip("|") for token in term.factors if token != "1/V2"))
+    return list(dict.fromkeys(token.strip("|") for token in term.factors if token not in PER_SPEED))
 
 
 def _reach(samples: Samples, runs: Sequence[Run]) -> Array:

@@ -16,13 +16,26 @@ from towtank.tank.run import Run
 FLOOR = 0.01
 """Smallest residual that is believed, as a share of the load's root mean square in the run (or kind, when steady)."""
 
-WEIGHT_STEADY = 0.7
-"""Default lambda: the value for slender craft, L/D > 8. A Run does not know its diameter; give 0.5 for fuller ones."""
+WEIGHT_STEADY = {"slender": 0.7, "full": 0.5}
+"""Default lambda: of slender craft, which drift far in a turn, and of fuller ones, for which both tests count alike.
+
+Source     perron, section 2.2 (steady drift weighs more for slender craft, after Miller et al.); the numbers are this
+           project's (THEORY section 4).
+"""
+
+SLENDER = 8.0
+"""L/D above which a craft is slender."""
 
 PAIRS = (("drift", "sway", "YKN"), ("incidence", "heave", "ZM"))
 """Steady kind, oscillatory kind, and the loads on which lambda shares the weight between the two."""
 
 _END = 1e-6  # at lambda 0 or 1 the outvoted side keeps this share, so that Yvdot and the like stay determined
+
+
+def default_share(runs: Sequence[Run]) -> float:
+    """Share lambda by the slenderness L/D of the hull; that of slender craft where the diameter is not known."""
+    known = [run.length / run.diameter for run in runs if run.diameter > 0.0]
+    return WEIGHT_STEADY["slender" if not known or known[0] > SLENDER else "full"]
 
 
 def load_scale(system: System) -> Array:

@@ -14,7 +14,7 @@ from towtank.model.fins import FinSet
 from towtank.model.rigid_body import Body
 from towtank.model.thrust import Screw
 from towtank.pilot.law import GAINS
-from towtank.symbols import LOADS, RATES, TERMS
+from towtank.symbols import LOADS, OPTIONAL, RATES, STANDING, TERMS
 
 SHIPPED_FINS = 4
 """Fins of the compiled forms; a craft with fewer gets fins without effect beside its own."""
@@ -23,7 +23,8 @@ SHIPPED_ROWS = 8
 
 BODY = tuple(field.name for field in fields(Body))
 ADDED = tuple(f"{load}{rate}dot" for load in LOADS for rate in RATES)
-DAMPING = tuple(name for name, term in TERMS.items() if not term.is_added_mass)
+OPTIONALS = tuple(name for group in OPTIONAL.values() for name in group)
+DAMPING = tuple(name for name in STANDING if not TERMS[name].is_added_mass)
 _SCREW = ("density", "diameter", "wake", "deduction", "torque", "force_per_square")
 
 
@@ -32,6 +33,7 @@ class Form:
     """What decides the text of the equations; everything else is a parameter.
 
     fins : number of fins.   split : variant of the derivatives.   axisymmetric, straightened : options of the model.
+    optional : terms of ``symbols.OPTIONAL`` take part.
     rows : knots of the propeller's table, 0 for constant thrust.   extra : a user's own load.
     """
 
@@ -41,6 +43,12 @@ class Form:
     straightened: bool = False
     rows: int = 0
     extra: ExtraLoad | None = None
+    optional: bool = False
+
+    @property
+    def damping(self) -> tuple[str, ...]:
+        """Names of the damping and fin coefficients that take part."""
+        return (*DAMPING, *OPTIONALS) if self.optional else DAMPING
 
     @property
     def shipped(self) -> bool:
@@ -48,7 +56,7 @@ class Form:
         return (
             self.fins == SHIPPED_FINS
             and self.rows in (0, SHIPPED_ROWS)
-            and not (self.axisymmetric or self.straightened or self.extra)
+            and not (self.axisymmetric or self.straightened or self.extra or self.optional)
         )
 
     @property
@@ -60,6 +68,7 @@ class Form:
             f"screw{self.rows}" if self.rows else "",
             "axisymmetric" if self.axisymmetric else "",
             "straightened" if self.straightened else "",
+            "optional" if self.optional else "",
             self.extra.name if self.extra else "",
         ]
         return "-".join(part for part in parts if part)
@@ -68,7 +77,7 @@ class Form:
     def names(self) -> tuple[str, ...]:
         """Names of the parameters, in order; the last 36 are the inverse of the mass matrix, row by row."""
         n = range(self.fins)
-        out = [*BODY, *DAMPING, *ADDED, "thrust", "current_north", "current_east", "current_down"]
+        out = [*BODY, *self.damping, *ADDED, "thrust", "current_north", "current_east", "current_down"]
         out += [f"mixing{i}{j}" for i in n for j in range(3)] + [f"unmixing{j}{i}" for j in range(3) for i in n]
         out += [f"{word}{i}" for word in ("max_angle", "max_rate", "time_constant") for i in n] + ["fin_share"]
         if self.straightened:
@@ -101,6 +110,7 @@ def form_of(model: Model) -> Form:
         straightened=bool(k.options.kappa_v or k.options.kappa_r),
         rows=max(rows, SHIPPED_ROWS) if rows else 0,
         extra=k.extra,
+        optional=k.optional,
     )
 
 
@@ -136,7 +146,7 @@ def system(form: Form, p: Sequence[Any]) -> System:
     )
     constants = Constants(
         body=Body(*(one(name) for name in BODY)),
-        c=SimpleNamespace(**{name: one(name) for name in DAMPING}),
+        c=SimpleNamespace(**{name: one(name) for name in form.damping}),
         added=[[one(f"{load}{rate}dot") for rate in RATES] for load in LOADS],
         mass_inverse=[list(row(f"inverse{i}", 6)) for i in range(6)],
         fins=fins,
@@ -144,6 +154,7 @@ def system(form: Form, p: Sequence[Any]) -> System:
         split=form.split,
         options=_options(form, one),
         extra=form.extra and form.extra.with_values({name: one(f"extra_{name}") for name in form.extra.values}),
+        optional=form.optional,
     )
     current = [one(f"current_{way}") for way in ("north", "east", "down")]
     pilot = SimpleNamespace(**{name: one(f"pilot_{name}") for name in GAINS})

@@ -27,7 +27,7 @@ def parameters(form: Form, model: Model, pilot: Pilot, thrust: float, current: S
     """The vector (len(form.names),) of ``model`` under ``pilot`` at ``thrust`` [N] in ``current`` (3,) [m/s, NED]."""
     k = model.constants
     values: dict[str, float] = {name: float(getattr(k.body, name)) for name in BODY}
-    values |= {name: float(getattr(k.c, name)) for name in DAMPING}
+    values |= {name: float(getattr(k.c, name)) for name in form.damping}
     values |= dict(zip(ADDED, np.asarray(k.added, dtype=float).ravel().tolist(), strict=True))
     values |= {"thrust": float(thrust)}
     values |= dict(zip(("current_north", "current_east", "current_down"), map(float, current), strict=True))

@@ -7,7 +7,7 @@ from typing import Any
 from towtank.model.algebra import Matrix, Ops, Scalar, Vector
 
 _SPEED2_FLOOR = 1e-12
-"""Smallest speed squared [m2/s2] that divides Xvvvv and Xwwww; the one ``towtank.terms`` uses."""
+"""Smallest speed squared [m2/s2] that divides a term; the one ``towtank.terms`` uses."""
 
 _CROSS_FLOOR = 1e-24
 """Added to v2 + w2 [m2/s2] and to q2 + r2 [rad2/s2] so that the root has a derivative at zero."""
@@ -42,6 +42,27 @@ def damping_matrix(c: Any, nu: Vector, ops: Ops, axisymmetric: bool = False) -> 
         [0, c.Kvv * av + c.Kuv * u, 0, c.Kpp * ap + c.Kup * au, 0, c.Krr * ar + c.Kur * u],
         [0, 0, c.Mww * aw + c.Muw * u, 0, c.Mqq * aq + c.Muq * au, 0],
         [0, c.Nvv * av + c.Nuv * u, 0, 0, 0, c.Nrr * ar + c.Nur * au],
+    ]
+
+
+def optional_load(c: Any, nu: Vector, ops: Ops) -> list[Scalar]:
+    """Load (6,) on the body [N, N m] of the terms of ``symbols.OPTIONAL``; ``c`` and ``nu`` as in ``damping_matrix``.
+
+    Source     fossen2021 (third-order odd expansion); perron, eq. 2.16, for Xuuvv and Xuuww.
+    Departure  Each is divided by the speed or its square; Xuuvv and Xuuww are even in v and w.
+    Valid      Ahead; motion in one plane at a time: products of both planes are left out.
+    """
+    u, v, w, _, q, r = nu
+    V2 = ops.fmax(u * u + v * v + w * w, _SPEED2_FLOOR)
+    V = ops.sqrt(V2)
+    vv, vr, rr, ww, wq, qq = v * v, v * r, r * r, w * w, w * q, q * q
+    return [
+        (c.Xuuvv * vv + c.Xuuww * ww) * u * u / V2,
+        (c.Yvvv * vv * v + c.Yvvr * vv * r + c.Yvrr * vr * r + c.Yrrr * rr * r) / V,
+        (c.Zwww * ww * w + c.Zwwq * ww * q + c.Zwqq * wq * q + c.Zqqq * qq * q) / V,
+        0.0,
+        (c.Mwww * ww * w + c.Mwwq * ww * q + c.Mwqq * wq * q + c.Mqqq * qq * q) / V,
+        (c.Nvvv * vv * v + c.Nvvr * vv * r + c.Nvrr * vr * r + c.Nrrr * rr * r) / V,
     ]
 
 

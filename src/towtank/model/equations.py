@@ -23,7 +23,7 @@ from towtank.derive.table import Derivatives
 from towtank.errors import InputError
 from towtank.model.added_mass import added_mass_matrix, coriolis_full, coriolis_reduced
 from towtank.model.algebra import Matrix, Ops, Scalar, Vector, frozen, ops_for, product, product_transposed
-from towtank.model.damping import damping_matrix
+from towtank.model.damping import damping_matrix, optional_load
 from towtank.model.extra import ExtraLoad, check_extra, extra_load
 from towtank.model.fins import (
     FinSet,
@@ -39,7 +39,7 @@ from towtank.model.restoring import restoring_vector
 from towtank.model.rigid_body import Body, body_of, coriolis_matrix, mass_matrix
 from towtank.model.thrust import Screw, screw_of, steady_thrust, thrust_load
 from towtank.model.values import known, replaced, values_of
-from towtank.symbols import TERMS
+from towtank.symbols import OPTIONAL, TERMS
 
 STATE = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r")
 """Position [m, NED], attitude [rad], velocity over ground in body axes [m/s, rad/s]; then one angle per fin [rad]."""
@@ -75,7 +75,7 @@ class Constants:
     """Everything constant in the right-hand side. Numbers may be floats, arrays or symbols.
 
     body, c (derivatives by name), added (6, 6), fins, screw (None for constant thrust), extra : what the terms take.
-    split, options : which form the terms have.
+    split, optional, options : which form the terms have; ``optional`` when some of ``symbols.OPTIONAL`` are not zero.
     mass_inverse (6, 6) is (M_RB - M_A)^-1, taken once from an LU factorisation when the model is made: the matrix is
     constant, so a solve at every step would repeat the same work.
     """
@@ -89,6 +89,7 @@ class Constants:
     split: bool
     options: ModelOptions
     extra: ExtraLoad | None = None
+    optional: bool = False
 
 
 def parts(k: Constants, nu: Vector, down: Vector, delta: Vector, thrust: Scalar, ops: Ops) -> dict[str, list[Scalar]]:
@@ -104,10 +105,13 @@ def parts(k: Constants, nu: Vector, down: Vector, delta: Vector, thrust: Scalar,
     if options.straightened:
         delta = effective_angles(k.fins, nu, delta, options.kappa_v, options.kappa_r, ops)
     force, torque = thrust_load(k.screw, thrust, nu[0], ops)
+    damping = product(damping_matrix(k.c, nu, ops, options.axisymmetric_crossflow), nu)
+    if k.optional:
+        damping = [a + b for a, b in zip(damping, optional_load(k.c, nu, ops), strict=True)]
     return {
         "rigid body": [-x for x in product(coriolis_matrix(k.body, nu), nu)],
         "added mass": product(coriolis(k.added, nu), nu),
-        "damping": product(damping_matrix(k.c, nu, ops, options.axisymmetric_crossflow), nu),
+        "damping": damping,
         "restoring": [-x for x in restoring_vector(k.body, down)],
         "fins": fin_load(k.c, k.fins, nu[0], delta, ops),
         "thrust": [force, 0.0, 0.0, torque, 0.0, 0.0],
@@ -247,6 +251,7 @@ class Model:
             split=self.derivatives.variant == "split",
             options=self.options,
             extra=self.extra,
+            optional=any(values.get(name) for group in OPTIONAL.values() for name in group),
         )
 
     @cached_property

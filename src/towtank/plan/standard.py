@@ -35,8 +35,9 @@ Two of each, because the linear and the quadratic damping of one amplitude canno
 
 DRIFT_DEG = (0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20)
 TURN_RATES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-TURN_WITH_DRIFT = ((0.3, 6), (0.3, -6))
-"""r' and drift [deg] of the turns with drift: both signs of v r, which separates Xvr from Xvv and Xrr."""
+TURN_WITH_DRIFT = ((0.2, 10), (0.2, -6), (0.4, 8), (0.4, -8))
+"""r' and drift [deg] of the turns with drift: both signs of v r, which separates Xvr from Xvv and Xrr, at two turns and
+several ratios of the two, which determine the mixed terms of third order. The stern stays within 20 deg."""
 
 SINGLE_FIN_DEG = (10, 20, 30, 40)
 VIRTUAL_FIN_DEG = (-10, -5, 5, 10, 15, 20, 25, 30, 35, 40)

@@ -23,7 +23,7 @@ FILE = "run.nc"
 _POSITION, _ATTITUDE = ("x", "y", "z"), ("phi", "theta", "psi")
 _DOTS = tuple(f"{rate}dot" for rate in RATES)
 _TEXT = ("id", "name", "kind", "craft", "symmetry", "level")
-_NUMBERS = ("speed", "period", "density", "length", "origin_from_nose")
+_NUMBERS = ("speed", "period", "density", "length", "origin_from_nose", "diameter")
 
 _NAMES = {
     **dict(zip(LOADS, ("surge force", "sway force", "heave force", "roll moment", "pitch moment", "yaw moment"),
@@ -157,7 +157,7 @@ def _run(variables: Mapping[str, Variable], attrs: Mapping[str, Any]) -> Run:
     history = History(variables["time"].values, stack(_POSITION), stack(_ATTITUDE), stack(RATES), stack(_DOTS))
     samples = len(history.time)
     text = {name: str(attrs[name]) for name in _TEXT}
-    number = {name: float(attrs[name]) for name in _NUMBERS}
+    number = {name: float(attrs[name]) for name in _NUMBERS if name != "diameter"}
     return Run(
         id=text["id"],
         name=text["name"],
@@ -180,6 +180,7 @@ def _run(variables: Mapping[str, Variable], attrs: Mapping[str, Any]) -> Run:
         flags=tuple(json.loads(attrs["flags"])),
         exploratory=bool(attrs["exploratory"]),
         provenance=json.loads(attrs["provenance"]),
+        diameter=float(attrs.get("diameter", 0.0)),
     )
 
 

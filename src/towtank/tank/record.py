@@ -57,5 +57,6 @@ def record(
         ensemble=ensemble,
         flags=flags,
         exploratory=test.exploratory,
+        diameter=craft.diameter,
         provenance=provenance(tank=type(tank).__name__, settings=tank.settings(), **extra),
     )

@@ -32,6 +32,7 @@ class Run:
     ensemble : loads of the model-form ensemble (members, N, 6), or None.
     flags : validity remarks, never empty silently: each is a short sentence with the limit.
     exploratory : recorded, never fitted.
+    diameter : of the hull [m]; 0 where it is not known.
     """
 
     id: str
@@ -55,6 +56,7 @@ class Run:
     flags: tuple[str, ...] = ()
     exploratory: bool = False
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    diameter: float = 0.0
 
     @property
     def steady(self) -> bool:
