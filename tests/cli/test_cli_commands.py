@@ -13,7 +13,21 @@ from typer.testing import CliRunner
 from towtank.cli.app import app
 from towtank.provenance import VERSION
 
-COMMANDS = ("run", "new", "check", "plan", "tow", "status", "derive", "trial", "mc", "assess", "report", "doctor")
+COMMANDS = (
+    "run",
+    "new",
+    "check",
+    "plan",
+    "tow",
+    "import",
+    "status",
+    "derive",
+    "trial",
+    "mc",
+    "assess",
+    "report",
+    "doctor",
+)
 runner = CliRunner()
 
 

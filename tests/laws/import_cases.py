@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from derive_synthetic import ROLL
 
+from synthetic_craft import SUBOFF, values
 from towtank.craft.library import read_craft
 from towtank.derive.select import allowed
 from towtank.frames import move_load, rotation
@@ -42,9 +43,9 @@ def known(seed: int = 5) -> dict[str, float]:
     random = np.random.default_rng(seed)
     names = [name for name in allowed("fourfold") if name not in ROLL]
     scale = {n: TERMS[n].prime_factor(HOKIE.water.density, HOKIE.length, HOKIE.speed) for n in names}
-    values = {n: scale[n] * -float(random.uniform(0.005, 0.02)) for n in names}
-    values["Nvdot"] = values["Yrdot"]
-    return values | {name: sign * values[twin] for name, (twin, sign) in FOURFOLD_TIES.items() if name in values}
+    found = {n: scale[n] * -float(random.uniform(0.005, 0.02)) for n in names}
+    found["Nvdot"] = found["Yrdot"]
+    return found | {name: sign * found[twin] for name, (twin, sign) in FOURFOLD_TIES.items() if name in found}
 
 
 def plan(samples: int = 32):
@@ -59,8 +60,8 @@ def halved(test) -> bool:
     return straight or test.kind in ("heave", "pitch", "surge")
 
 
-def runs_of(made, values):
-    tank = LpmTank(values)
+def runs_of(made, coefficients):
+    tank = LpmTank(coefficients)
     return [tank.run(HOKIE, test, Silent()) for test in made.tests]
 
 
@@ -163,13 +164,13 @@ writes. The head of each mapping says what it has to undo.
 
 def write_samples(folder: Path) -> None:
     """The files of tests/data/import: a mapping for each format, with runs of Hokie at 1 m/s."""
-    values = known()
+    tank = LpmTank(values(SUBOFF, HOKIE))
     motions = {
         "drift-p08": Drift(1.0, float(np.radians(8.0))), "straight": Drift(1.0, 0.0), "sway": Sway(1.0, 0.8, 0.2),
         "heave": Heave(1.0, 0.8, 0.2),
     }  # fmt: skip
     runs = {
-        name: LpmTank(values).run(HOKIE, CaptiveTest(name, 1.0, motion, periods=2, samples=24), Silent())
+        name: tank.run(HOKIE, CaptiveTest(name, 1.0, motion, periods=2, samples=24), Silent())
         for name, motion in motions.items()
     }
     folder.mkdir(parents=True, exist_ok=True)

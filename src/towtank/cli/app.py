@@ -8,9 +8,11 @@ import typer
 
 from towtank.cli.assess import assess
 from towtank.cli.check import check
+from towtank.cli.check_coefficients import check_coefficients
 from towtank.cli.derive import derive
 from towtank.cli.doctor import doctor
 from towtank.cli.grid import grid
+from towtank.cli.imports import import_
 from towtank.cli.mc import mc
 from towtank.cli.new import new
 from towtank.cli.plan import plan
@@ -49,5 +51,22 @@ def options(
     """Options before the command; ``--version`` acts in its callback."""
 
 
-for _command in (run, new, check, plan, tow, status, grid, derive, trial, mc, assess, sweep, report, doctor):
-    app.command()(_command)
+for _command in (
+    run,
+    new,
+    check,
+    check_coefficients,
+    plan,
+    tow,
+    import_,
+    status,
+    grid,
+    derive,
+    trial,
+    mc,
+    assess,
+    sweep,
+    report,
+    doctor,
+):
+    app.command(_command.__name__.strip("_").replace("_", "-"))(_command)

@@ -38,10 +38,10 @@ from towtank.tank.imported.convert import (
     weight_of,
     whole_of_half,
 )
-from towtank.tank.imported.mapping import Spec
+from towtank.tank.imported.mapping import Spec, Window
 from towtank.tank.imported.moving import explained, history_of
 from towtank.tank.imported.reading import read_mapping
-from towtank.tank.imported.sampling import Record, averaged, free, in_periods, windowed
+from towtank.tank.imported.sampling import LAST, Record, averaged, free, in_periods, windowed
 from towtank.tank.imported.source import columns_in_si, input_hashes, read_source
 from towtank.tank.imported.table import Doubt, Table
 from towtank.tank.run import Run
@@ -104,6 +104,7 @@ def import_run(craft: Craft, spec: Spec) -> Run:
         loads=loads * factor.loads,
         flags=tuple(str(text) for text in words if isinstance(text, Doubt)),
         exploratory=spec.exploratory,
+        diameter=craft.diameter,
         provenance=provenance(
             hashes,
             tank="imported",
@@ -144,7 +145,8 @@ def _kind(spec: Spec) -> str:
 def _record(spec: Spec, table: Table, time: str) -> tuple[Record, tuple[str, ...]]:
     """The part of the file that counts, in SI, along the file's axes; and what was done to get it."""
     columns, units = columns_in_si(spec, table, time)
-    rows = windowed(table, columns["time"], columns, spec.window)
+    unsaid = spec.steady and spec.window == Window()
+    rows = windowed(table, columns["time"], columns, Window(last=LAST) if unsaid else spec.window)
     clock = columns.pop("time")[rows]
     kept = {name: values[rows] for name, values in columns.items()}
     if spec.steady:
@@ -154,6 +156,7 @@ def _record(spec: Spec, table: Table, time: str) -> tuple[Record, tuple[str, ...
     else:
         record = in_periods(table, rows, clock, kept, 2.0 * math.pi / spec.motion.numbers["frequency"])
     told = [f"window: {len(rows)} of {len(table.values)} rows"] if len(rows) < len(table.values) else []
+    told += [f"the mapping names no window: the last {100 * LAST:g} % of a steady record are taken"] if unsaid else []
     return record, (*table.repairs, *units, *told, *record.said)
 
 
