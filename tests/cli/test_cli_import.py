@@ -143,6 +143,15 @@ def test_a_study_with_a_plan_is_not_imported_into(data):
     assert "--out DIR" in err
 
 
+@pytest.mark.parametrize("command", ["run", "plan", "tow"])
+def test_no_plan_is_laid_over_imported_runs(command, data):
+    assert call("import", data / "star.toml", "--out", "study")[0] == 0
+    code, _, err = call(command, "study")
+    assert code == 2
+    assert "holds imported runs and no plan" in err
+    assert not Path("study/plan.toml").exists()
+
+
 def test_imported_runs_of_three_meshes_make_a_grid_study(data):
     text = (data / "sheet.toml").read_text("utf-8")
     head, *rows = (data / "sheet.csv").read_text("utf-8").splitlines()

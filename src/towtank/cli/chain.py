@@ -177,6 +177,11 @@ class Chain:
 
     def make_plan(self) -> None:
         """Lay out the captive tests, unless the user edited the plan of the study: then that one holds."""
+        if self.study.imported:
+            raise InputError(
+                f"{self.study.root} holds imported runs and no plan. A plan would put them aside; go on with towtank "
+                "derive, trial, assess and report, or choose another folder with --out DIR."
+            )
         if self.study.edited(self.study.plan):
             self.plan()
             self.reply.log(f"plan     edited by hand, used as it is (remove {self.study.plan} for the standard one)")

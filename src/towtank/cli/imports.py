@@ -83,10 +83,12 @@ def _import(reply: Reply, mapping: Path, files: Sequence[Path], out: Path | None
     _refuse_plan(chain)
     chain.prepare()
     replaced = _put_aside(chain, runs)
-    paths = [write_run(run, run_path(chain.study.root, run.id)) for run in runs]
+    for run in runs:
+        write_run(run, run_path(chain.study.root, run.id))
     flags = Counter(flag for run in runs for flag in run.flags)
     told = {"runs": len(runs), "levels": sorted({run.level for run in runs}), "flags": dict(flags)}
-    chain.study.record("tow", chain.inputs("tow"), _all_runs(chain) or paths, time.perf_counter() - started, told)
+    kept = told | {"imported": sorted(run.id for run in runs)}
+    chain.study.record("tow", chain.inputs("tow"), _all_runs(chain), time.perf_counter() - started, kept)
     reply.file("runs", chain.study.runs)
     reply.summary |= told | {
         "replaced": replaced,

@@ -111,6 +111,11 @@ class Study:
         """True when ``path`` holds something else than what a stage of this study wrote."""
         return path.exists() and path.stat().st_size > 0 and file_hash(path) != self.written(path)
 
+    @property
+    def imported(self) -> bool:
+        """True when the runs were made elsewhere, without a plan of this study."""
+        return not self.plan.exists() and "imported" in self.stages().get("tow", {}).get("summary", {})
+
     def current(self, stage: str, inputs: Mapping[str, str]) -> bool:
         """True when ``stage`` was done with these inputs and its files are as it left them."""
         record = self.stages().get(stage)

@@ -150,7 +150,8 @@ def in_periods(
     if per < SAMPLES_PER_PERIOD:
         raise InputError(
             f"{table.title}: {per} samples in a period of {period:g} s. Below {SAMPLES_PER_PERIOD} the third harmonic, "
-            "which carries the cross-flow terms, is lost; write the loads more often."
+            "which carries the cross-flow terms, is lost; write the loads more often, or correct the frequency (rad/s "
+            "or Hz?)."
         )
     said: list[str] = [f"{count} whole period{'s' if count > 1 else ''} of {period:.6g} s, {per} samples each"]
     left = max(span - count * period, 0.0)
