@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from towtank.cli import fitting
 from towtank.cli.reply import Remarks, Reply
 from towtank.cli.scatter import asked, spread
 from towtank.cli.study import Study, file_hash, program_hash
@@ -69,6 +70,7 @@ class Chain:
     """One study under way. ``speed`` as the user wrote it; None is the craft's own.
 
     drawing : what the user asked of the Monte Carlo study, as in ``cli.scatter.DRAWING``; None: what the study has.
+    fitting : what the user asked of the fit, as in ``cli.fitting.FITTING``; None: what the study has.
     """
 
     study: Study
@@ -77,6 +79,7 @@ class Chain:
     reply: Reply
     speed: str | None = None
     drawing: dict[str, str] | None = None
+    fitting: dict[str, str] | None = None
     wall: dict[str, float] = field(default_factory=dict)
     _runs: tuple[Run, ...] | None = None
     _told: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -106,7 +109,7 @@ class Chain:
             case "tow":
                 return craft | {"plan": file_hash(study.plan), "tank": digest(self.tank().settings(), 16)}
             case "derive":
-                return craft | {"runs": files.get("tow", "")}
+                return craft | {"runs": files.get("tow", "")} | fitting.inputs(self)
             case "trials":
                 return craft | {"derivatives": file_hash(study.derivatives)}
             case "mc":
@@ -136,7 +139,8 @@ class Chain:
         self.wall[stage] = round(wall, 3)
         self.reply.log(f"{stage:<8} {wall:6.1f} s")
 
-    def _replacing(self, path: Path) -> Path:
+    def replacing(self, path: Path) -> Path:
+        """``path``, after a file that somebody edited was put aside."""
         aside = self.study.put_aside(path)
         if aside is not None:
             self.reply.log(f"{path} was edited since it was written; the edited file is kept as {aside.name}")
@@ -236,17 +240,9 @@ class Chain:
 
     def derive(self) -> None:
         """Derivatives and model from the runs."""
-        self.do("derive", self._derive)
+        self.do("derive", lambda: fitting.write(self))
         self.reply.file("derivatives", self.study.derivatives)
         self.reply.file("model", self.study.model)
-
-    def _derive(self) -> Sequence[Path]:
-        from towtank.derive.derive import derive
-        from towtank.derive.files import write_derivatives
-
-        derived = derive(self.runs())
-        write_derivatives(derived, self._replacing(self.study.derivatives))
-        return self.study.derivatives, self.write_model()
 
     def write_model(self) -> Path:
         """Write the self-contained model."""
@@ -309,7 +305,7 @@ class Chain:
         from towtank.verdict.assess import assess
         from towtank.verdict.files import write_verdict
 
-        write_verdict(assess(self.model(), self.trajectories()), self._replacing(self.study.verdict))
+        write_verdict(assess(self.model(), self.trajectories()), self.replacing(self.study.verdict))
         return (self.study.verdict,)
 
     def verdict(self) -> dict[str, Any]:

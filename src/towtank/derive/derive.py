@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import mode
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from towtank.derive import quality, weights
+from towtank.derive.consistency import consistency
 from towtank.derive.convert import about_point
 from towtank.derive.cycles import settled
 from towtank.derive.expand import Expansion, expand
@@ -72,7 +73,9 @@ def derive(
     share = weights.default_share(within) if weight_steady is None else float(weight_steady)
     mesh = _mesh(grid, within)
     found = judged(within, share, mesh, optional) if screening else _unjudged(within, share, mesh, optional)
-    return about_point(_derivatives(_Fitted(tuple(runs), outside, found, share, mesh)), about, length)
+    result = _derivatives(_Fitted(tuple(runs), outside, found, share, mesh))
+    checks = [check.document() for check in consistency(result)]
+    return about_point(replace(result, quality={**result.quality, "consistency": checks}), about, length)
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,8 @@ def _derivatives(it: _Fitted) -> Derivatives:
 def _quality(it: _Fitted, names: Sequence[str], expansion: Expansion, origin: Origin) -> dict[str, Any]:
     runs, samples = it.judged.runs, it.judged.samples
     return {
+        "symmetry": runs[0].symmetry,
+        "body": {"diameter": runs[0].diameter},
         "weight_steady": it.share,
         "range_deg": DRIFT_LIMIT_DEG,
         "fins_range_deg": FIN_LIMIT_DEG,

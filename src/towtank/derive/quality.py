@@ -15,8 +15,10 @@ from towtank.derive.identify import Solved
 from towtank.derive.regress import solve
 from towtank.derive.select import Choice, independent
 from towtank.derive.system import build
-from towtank.symbols import FOURFOLD_TIES, LOADS
+from towtank.frames import Array
+from towtank.symbols import FOURFOLD_TIES, LOADS, STANDING
 from towtank.tank.run import Run
+from towtank.terms import term_loads
 
 KEY_TERMS = ("Yuv", "Yvv", "Nuv", "Nvv", "Yur", "Yrr", "Nur", "Nrr", "Zuw", "Zww", "Muw", "Mww", "Xvv")
 SENSITIVITY = (0.0, 0.5, 1.0)
@@ -79,9 +81,9 @@ def tie_gaps(runs: Sequence[Run], samples: Samples, solved: Solved) -> dict[str,
     """
     if runs[0].symmetry != "fourfold" or not any(run.kind in ("heave", "pitch", "incidence") for run in runs):
         return {}
-    names = solved.choice.order
+    names = tuple(name for name in solved.choice.order if name in STANDING)
     free = Choice(names, {name: (name, 1.0) for name in names}, {})
-    nominal = replace(samples, loads=samples.loads[:1])
+    nominal = replace(samples, loads=samples.loads[:1] - _optional_loads(samples, solved))
     system = build(nominal, free)
     scale = weights.load_scale(system)
     kept, reasons = independent(system.matrix / scale[system.load][:, None], names)
@@ -94,6 +96,17 @@ def tie_gaps(runs: Sequence[Run], samples: Samples, solved: Solved) -> dict[str,
             value = float(own[system.names.index(term)])
             out[term] = {"untied": value, "tied": tied, "difference": value - tied}
     return out
+
+
+def _optional_loads(samples: Samples, solved: Solved) -> Array:
+    """Loads (N, 6) of the optional terms as the ties give them: one check run of a plane cannot tell them apart."""
+    unknowns = dict(zip(solved.system.names, solved.fit.unknowns[:, 0].tolist(), strict=True))
+    values = {
+        name: sign * unknowns[base]
+        for name, (base, sign) in solved.choice.members.items()
+        if name not in STANDING and base in unknowns
+    }
+    return term_loads(values, samples.nu, samples.nudot, samples.control)
 
 
 def period_change(samples: Samples, names: Sequence[str]) -> dict[str, float]:

@@ -10,16 +10,19 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from towtank.derive.cycles import Samples, settled
+from towtank.derive import measure
+from towtank.derive.cycles import Samples, family_of, settled
 from towtank.derive.fourier import DRIVEN, harmonics
+from towtank.derive.identify import identify
 from towtank.derive.measure import driven
 from towtank.derive.screen import name_of
 from towtank.derive.table import Derivatives
+from towtank.derive.weights import default_share, load_scale
 from towtank.errors import DeriveError
 from towtank.frames import Array
 from towtank.plan.limits import FREQUENCY_WARNING, FREQUENCY_WARNING_ELSE
 from towtank.provenance import provenance
-from towtank.symbols import LOADS, RATES, TERMS
+from towtank.symbols import LOADS, OPTIONAL, RATES, TERMS
 from towtank.tank.run import Run
 from towtank.terms import term_loads
 
@@ -107,8 +110,21 @@ class Advice:
 
 
 @dataclass(frozen=True)
+class Gain:
+    """What a group of ``symbols.OPTIONAL`` would buy in one kind of run: share of the driven loads that is missed.
+
+    kind : as ``cycles.family_of``.   without, within : root mean square over its runs, each against the fit to others.
+    """
+
+    group: str
+    kind: str
+    without: float
+    within: float
+
+
+@dataclass(frozen=True)
 class FrequencyStudy:
-    """Points, trends, loops and advice of one set of runs; ``level`` of evidence as in Run."""
+    """Points, trends, loops, advice and gains of one set of runs; ``level`` of evidence as in Run."""
 
     craft: str
     level: str
@@ -116,6 +132,7 @@ class FrequencyStudy:
     trends: tuple[Trend, ...]
     loops: tuple[Loop, ...]
     advice: tuple[Advice, ...]
+    gains: tuple[Gain, ...]
     provenance: Mapping[str, Any]
 
 
@@ -154,6 +171,7 @@ def frequency_study(runs: Sequence[Run], derivatives: Derivatives) -> FrequencyS
             _advice(kind, points, trends, derivatives.reference.length)
             for kind in dict.fromkeys(run.kind for run in waving)
         ),
+        tuple(_gains(runs, derivatives)),
         provenance({name_of(run, runs): run.id for run in waving}),
     )
 
@@ -218,6 +236,30 @@ def _trend(kind: str, term: str, own: Sequence[Point], derivatives: Derivatives)
     return Trend(kind, term, limit, std, limit - half, limit + half, bend, growth, len(own), fit)
 
 
+def _gains(runs: Sequence[Run], derivatives: Derivatives) -> Iterator[Gain]:
+    """Fit the runs that ``derivatives`` rest on once more with each group of optional terms that these leave out."""
+    out = {name for name, _ in derivatives.rejected}
+    kept = [run for run in runs if name_of(run, runs) not in out]
+    samples, share = settled(kept), float(derivatives.quality.get("weight_steady", default_share(kept)))
+    groups = [group for group, names in OPTIONAL.items() if not set(names) & set(derivatives.names)]
+    plain = _missed(kept, samples, share, ()) if groups else {}
+    for group in groups:
+        for kind, value in _missed(kept, samples, share, (group,)).items():
+            yield Gain(group, kind, plain[kind], value)
+
+
+def _missed(runs: Sequence[Run], samples: Samples, share: float, optional: tuple[str, ...]) -> dict[str, float]:
+    """Kind -> share of the driven loads that the fit with ``optional`` terms misses."""
+    solved = identify(runs, samples, share, optional=optional)
+    found = measure.waves(runs, samples, solved.choice.order)
+    fits = measure.misfits(runs, solved, measure.left_out(solved), found, load_scale(solved.system))
+    families = [family_of(run) for run in runs]
+    return {
+        kind: float(np.sqrt(np.mean([fits[i, 0] ** 2 for i, name in enumerate(families) if name == kind])))
+        for kind in dict.fromkeys(families)
+    }
+
+
 def _differ(values: Array) -> bool:
     return bool(np.ptp(values) > 1e-3 * np.abs(values).max())
 
@@ -242,7 +284,7 @@ def loop_area(x: Array, y: Array) -> float:
 
 
 def _advice(kind: str, points: Sequence[Point], trends: Sequence[Trend], length: float) -> Advice:
-    """Frequencies that keep each driven load within ``TOLERANCE`` of its limit; amplitudes as large as were accepted."""
+    """Frequencies that keep every driven load within ``TOLERANCE`` of its limit; the largest accepted amplitude."""
     warned = FREQUENCY_WARNING.get(kind, FREQUENCY_WARNING_ELSE)
     own = [trend for trend in trends if trend.kind == kind]
     reach = {load: _reach(own, load, length, warned) for load in dict.fromkeys(trend.term[0] for trend in own)}

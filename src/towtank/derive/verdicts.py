@@ -215,11 +215,11 @@ def verdict_of(tests: Mapping[str, Tested]) -> Verdict:
 
 
 def _words(name: str, test: Tested, rejected: bool) -> str:
-    """``lack of fit 41 %, above 30 %: ...``."""
+    """``lack of fit 41 %, above 30 %``."""
     limit = LIMITS[name]
     bound = limit.reject if rejected else limit.weigh
     size = 100.0 if limit.unit == "%" else 1.0
-    return f"{name} {size * test.excess:.3g} {limit.unit}, above {size * bound:g} {limit.unit} ({limit.why})"
+    return f"{name} {size * test.excess:.3g} {limit.unit}, above {size * bound:g} {limit.unit}"
 
 
 def _as_weighed(verdict: Verdict, trust: float) -> Verdict:

@@ -56,7 +56,7 @@ class Form:
         return (
             self.fins == SHIPPED_FINS
             and self.rows in (0, SHIPPED_ROWS)
-            and not (self.axisymmetric or self.straightened or self.extra or self.optional)
+            and not (self.axisymmetric or self.straightened or self.extra or (self.optional and self.split))
         )
 
     @property
@@ -95,7 +95,11 @@ class Form:
         return {name: i for i, name in enumerate(self.names)}
 
 
-SHIPPED = tuple(Form(split=split, rows=rows) for split in (False, True) for rows in (0, SHIPPED_ROWS))
+SHIPPED = tuple(
+    Form(split=split, rows=rows, optional=optional)
+    for split, optional in ((False, False), (True, False), (False, True))
+    for rows in (0, SHIPPED_ROWS)
+)
 """The forms compiled at install."""
 
 

@@ -1,0 +1,76 @@
+"""The derive stage of a study: what the user asked of the fit, the mesh study it takes up, the frequency study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from towtank.cli.study import file_hash
+
+if TYPE_CHECKING:
+    from towtank.cli.chain import Chain
+    from towtank.derive.study import FrequencyStudy
+    from towtank.derive.table import Derivatives
+    from towtank.grid.study import GridStudy
+
+FITTING = {"optional": "", "steady": "", "screening": "yes"}
+"""What is asked of a fit that was asked for nothing else: no optional terms, lambda by slenderness, screening."""
+
+
+def asked(chain: Chain) -> dict[str, str]:
+    """What is asked of the fit: by the user now, by the record of the study, or ``FITTING``."""
+    known = chain.study.stages().get("derive", {}).get("inputs", {})
+    return chain.fitting or {name: known.get(name, usual) for name, usual in FITTING.items()}
+
+
+def inputs(chain: Chain) -> dict[str, str]:
+    """Name -> hash or text of what the fit depends on beside craft and runs."""
+    return asked(chain) | {"grid": file_hash(_grid_file(chain))}
+
+
+def fit(chain: Chain) -> Derivatives:
+    """Derivatives of the runs of the study."""
+    from towtank.derive.derive import derive
+
+    wanted = asked(chain)
+    return derive(
+        chain.runs(),
+        weight_steady=float(wanted["steady"]) if wanted["steady"] else None,
+        screening=wanted["screening"] == "yes",
+        grid=_grid(chain),
+        optional=tuple(wanted["optional"].split(",")) if wanted["optional"] else (),
+    )
+
+
+def study_frequencies(chain: Chain) -> tuple[FrequencyStudy, Path]:
+    """The frequency and amplitude study of the runs, and the file it was written to."""
+    from towtank.derive.study import frequency_study
+    from towtank.derive.study_files import FILE, write_frequencies
+
+    found = frequency_study(chain.runs(), chain.derivatives())
+    return found, write_frequencies(found, chain.study.root / FILE)
+
+
+def write(chain: Chain) -> Sequence[Path]:
+    """Fit, and write derivatives and model."""
+    from towtank.derive.files import write_derivatives
+
+    derived = fit(chain)
+    write_derivatives(derived, chain.replacing(chain.study.derivatives))
+    return chain.study.derivatives, chain.write_model()
+
+
+def _grid_file(chain: Chain) -> Path:
+    return chain.study.root / "grid.json"
+
+
+def _grid(chain: Chain) -> GridStudy | None:
+    """The mesh study of the study folder, when there is one."""
+    from towtank.grid.files import read_grid
+
+    path = _grid_file(chain)
+    if not path.exists():
+        return None
+    chain.reply.log(f"derive   mesh uncertainty from {path}")
+    return read_grid(path)
