@@ -15,6 +15,7 @@ from import_cases import (
     HOKIE,
     STAR_AXES,
     STAR_COLUMNS,
+    forces_dat,
     inertial,
     known,
     motion_text,
@@ -141,6 +142,47 @@ def test_mat_of_version_7_3(tmp_path):
     assert_same(one(tmp_path, "sway", form="mat", file="run.mat", cols=columns(NAMES[:7], "run.")), run)
 
 
+def test_mat_of_version_7_3_with_a_structure_array(tmp_path):
+    """Such an array holds a reference to each value; a name without a number is refused."""
+    run = RUNS["sway"]
+    with h5py.File(tmp_path / "run.mat", "w") as file:
+        for i, name in enumerate(NAMES[:7]):
+            values = table(run)[:, i][None, :]
+            places = [file.create_dataset(f"#refs#/{name}{k}", data=values * k).ref for k in (0.0, 1.0)]
+            file.create_dataset(f"runs/{name}", data=np.array(places, dtype=h5py.ref_dtype)[:, None])
+    text = columns(NAMES[:7], "runs(2).")
+    assert_same(one(tmp_path, "sway", form="mat", file="run.mat", cols=text), run)
+    with pytest.raises(InputError, match="Choose one by its number"):
+        one(tmp_path, "sway", form="mat", file="run.mat", cols=columns(NAMES[:7], "runs."))
+
+
+@pytest.mark.parametrize("form", ["netcdf", "mat"])
+def test_a_variable_that_is_missing_or_of_another_length_is_an_error(form, tmp_path):
+    values = {name: table(RUNS["sway"])[:, i].copy() for i, name in enumerate(NAMES[:7])}
+    values["N"] = values["N"][:-1]
+    if form == "mat":
+        savemat(tmp_path / "run.file", values, appendmat=False)
+    else:
+        made = {name: Variable((f"row{len(item)}",), item) for name, item in values.items()}
+        write_netcdf(tmp_path / "run.file", "someone/else/1", made, {})
+    with pytest.raises(InputError, match="different lengths"):
+        one(tmp_path, "sway", form=form, file="run.file", cols=columns(NAMES[:7]))
+    with pytest.raises(InputError, match="no variable 'r'"):
+        one(tmp_path, "sway", form=form, file="run.file", cols=columns((*NAMES[:7], "r")))
+
+
+def test_function_objects_of_several_patches_add_up(tmp_path):
+    run = RUNS["sway"]
+    for name, share in (("hull", 0.7), ("fins", 0.3)):
+        forces_dat(tmp_path / "case" / name / "0" / "forces.dat", run.history.time, share * run.loads)
+    point = f'{{ nose = ["{HOKIE.origin_from_nose!r} m", "0 m", "0 m"] }}'
+    files = 'case/hull", "case/fins'
+    head = HEAD.format(form="openfoam", speed=1.0, density=HOKIE.water.density, axes='["x", "y", "z"]')
+    head += f'moment_point = {point}\nsum = true\n[[run]]\nname = "sway"\nfiles = ["{files}"]\n'
+    (tmp_path / "map.toml").write_text(head + f"motion = {MOTION_TEXT['sway']}\n", encoding="utf-8")
+    assert_same(import_runs(tmp_path / "map.toml")[0], run)
+
+
 def test_star_monitors_in_a_file_each(tmp_path):
     run = RUNS["sway"]
     text = star_csv(tmp_path / "all.csv", *seen(run)).read_text("utf-8").splitlines()
@@ -205,6 +247,17 @@ def test_a_motion_from_columns_is_differentiated_where_needed(name, given, tmp_p
     assert any("time derivatives" in text for text in found.provenance["conversions"])
 
 
+def test_positions_may_be_those_in_the_water(tmp_path):
+    run = RUNS["surge"]
+    values = table(run)
+    values[:, 7] += run.speed * run.history.time
+    csv(tmp_path / "run.csv", values[:, :13], NAMES[:13])
+    motion = '{ kind = "surge", frequency = "0.3 rad/s", from = "columns", position_in = "water" }'
+    found = one(tmp_path, "surge", cols=columns(NAMES[:13]), motion=motion)
+    # One harmonic of a motion that has one.
+    assert_same(found, run)
+
+
 def test_columns_along_axes_of_the_file_are_turned_with_the_loads(tmp_path):
     """x aft and z up in the whole file: positions, angles, velocities and loads alike."""
     run = RUNS["yaw"]
@@ -230,6 +283,39 @@ def test_a_phase_and_a_start_say_where_in_the_cycle_the_file_begins(tmp_path):
         again = term_loads(VALUES, found.history.nu, found.history.nudot, found.control)
         np.testing.assert_allclose(found.loads, again, atol=1e-9 * np.abs(loads).max())
         assert any(text.startswith("measured y: phase") for text in found.provenance["conversions"])
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "sign"), [("heave", "z", -1.0), ("pitch", "z", -1.0), ("roll", "phi", -1.0)]
+)
+def test_a_displacement_in_the_file_is_compared_with_the_stated_motion_along_its_axes(name, column, sign, tmp_path):
+    """x aft and z up: the column has the opposite sign of the body's, and that is not taken for a phase of 180 deg."""
+    run = RUNS[name]
+    time, loads = seen(run)
+    moved = sign * (run.history.position[:, 2] if column == "z" else run.history.attitude[:, 0])
+    csv(tmp_path / "run.csv", np.column_stack([time, loads, moved]), (*NAMES[:7], column))
+    found = one(tmp_path, name, axes='["-x", "y", "-z"]', cols=columns((*NAMES[:7], column)))
+    assert_same(found, run)
+    assert any(text.startswith(f"measured {column}: phase") for text in found.provenance["conversions"])
+    assert not found.flags
+
+
+@pytest.mark.parametrize(("name", "given"), [("drift", ("psi",)), ("drift", ("u", "v")), ("turn", ("u", "v", "r"))])
+def test_a_steady_motion_from_columns_is_their_average(name, given, tmp_path):
+    run = RUNS[name]
+    h, count = run.history, 60
+    held = {"psi": h.attitude[0, 2], "u": h.nu[0, 0], "v": h.nu[0, 1], "r": h.nu[0, 5]}
+    row = np.concatenate([run.loads[0], [held[key] for key in given]])
+    values = np.column_stack([np.arange(count) * 0.1, np.tile(row, (count, 1))])
+    csv(tmp_path / "run.csv", values, (*NAMES[:7], *given))
+    motion = f'{{ kind = "{name}", from = "columns" }}'
+    assert_same(one(tmp_path, name, cols=columns((*NAMES[:7], *given)), motion=motion), run)
+
+
+def test_a_turn_from_columns_needs_its_rate(tmp_path):
+    csv(tmp_path / "run.csv", table(RUNS["turn"]))
+    with pytest.raises(InputError, match="a turn from columns needs its rate"):
+        one(tmp_path, "turn", cols=columns((*NAMES[:7], "u", "v")), motion='{ kind = "turn", from = "columns" }')
 
 
 def test_a_free_motion_of_columns_keeps_its_loads(tmp_path):

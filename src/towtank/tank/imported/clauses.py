@@ -75,6 +75,8 @@ def motion_of(run: Mapping[str, Any], columns: Collection[str], where: str) -> M
         raise InputError(
             f"{place}: no column of motion is mapped (u .. r, x y z, phi theta psi). Map some, or define it."
         )
+    if from_columns and kind == "turn" and not set("pqr") & set(columns):
+        raise InputError(f"{place}: a turn from columns needs its rate. Map r, or define the turn by rate and drift.")
     given = {"speed", "amplitude"} if from_columns else {"speed"}
     for key in [item.name for item in fields if item.default is dataclasses.MISSING and item.name not in given]:
         if key not in table:

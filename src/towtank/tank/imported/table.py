@@ -148,18 +148,18 @@ def _factor(stated: str, given: str, unit: str, where: str) -> float:
 
 
 def _value_of(text: str, unit: str, where: str) -> float | InputError:
-    """One ``text`` in the SI ``unit``. "N-m" is a product: no unit of the field is a difference."""
+    """One ``text`` in the SI ``unit``. "N-m" and "Nm" are products, "s2" is a square: so they stand in headers."""
     plain = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", text.replace("radian", "rad").replace("·", "*"))
+    plain = re.sub(r"(?<=[A-Za-z])([234])\b", r"^\1", re.sub(r"\b([kM]?N)m\b", r"\1*m", plain))
     if unit == "" and plain in ("", "1", "-"):
         return 1.0
     try:
-        value = si(f"1 {plain}", unit.replace("rad/s^2", "1/s^2"), where)
+        return si(f"1 {plain}", unit.replace("rad/s^2", "1/s^2"), where)
     except InputError:
         return InputError(
             f"{where}: the unit {text!r} is no unit of {unit or 'a pure number'}. Map another column, or correct the "
             "unit."
         )
-    return value
 
 
 def read_bytes(path: Path) -> bytes:
