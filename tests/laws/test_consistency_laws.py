@@ -36,6 +36,7 @@ ABOVE = {
     "decimal point of Zww": ({"Zww": -68.0}, {"planes: Zww against Yvv": FAIL, "cross-flow arm: Mqq": WARN}),
     "Mqq doubled": ({"Mqq": -1360.0}, {"planes: Mqq against Nrr": FAIL}),
     "Muw turned": ({"Muw": -466.0}, {"planes: Muw against Nuv": FAIL, "signs: Muw": WARN}),
+    "third order turned": ({"Yvvv": -300.0, "Zwww": 300.0}, {"planes: Zwww against Yvvv": FAIL}),
     "a fifth between the planes": ({"Zuw": -72.0}, {"planes: Zuw against Yuv": WARN}),
     "roll damping turned": ({"Kpp": 2.0, "Kup": 3.0}, {"signs: Kpp": FAIL, "signs: Kup": FAIL}),
     "rudder turned": ({"Yuudr": -40.0, "Zuude": 40.0}, {"signs: Yuudr": FAIL, "signs: Zuude": FAIL}),

@@ -13,7 +13,7 @@ from towtank.derive.inertia import cross_terms, identities, positive, symmetry
 from towtank.derive.invariance import energy, galilean
 from towtank.derive.magnitudes import magnitudes
 from towtank.derive.table import Derivatives
-from towtank.symbols import FOURFOLD_TIES
+from towtank.symbols import FOURFOLD_TIES, OPTIONAL_TIES
 
 TIE_LIMIT, TIE_WORST = 0.10, 0.30
 """Gap between the planes of a 4-fold craft. roddy1990 states 4 to 5 % (static) and 10 % (rotary) at 95 %. The second is
@@ -74,7 +74,7 @@ def ties(s: Subject) -> tuple[Check, ...]:
     free = s.quality.get("tie_gaps", {})
     found = [
         _tie(s, term, base, sign, free.get(term, {}).get("untied"))
-        for term, (base, sign) in FOURFOLD_TIES.items()
+        for term, (base, sign) in (FOURFOLD_TIES | OPTIONAL_TIES).items()
         if s.has(term, base)
     ]
     words = "terms of the vertical plane are those of the horizontal plane, with the signs of a 4-fold craft."

@@ -57,7 +57,6 @@ def _same(*names: str) -> dict[str, Entry]:
 
 _ADDED = [name for name, term in TERMS.items() if term.is_added_mass]
 _FINS = ["Xuudd", "Yuudr", "Zuude", "Kuudroll", "Muude", "Nuudr"]
-_EVEN = {plane: f"Xuu{plane}" if f"Xuu{plane}" in TERMS else f"X{plane}" for plane in ("vv", "ww")}
 
 _ODD = (
     "{name} multiplies {product}, odd in {rate}: port and starboard would have opposite axial forces. Read as the even "
@@ -74,8 +73,8 @@ PRINTED = Formulation(
     {
         **_same(*_ADDED, *_FINS, "Xuu", "Yvv", "Yuv", "Yrr", "Yur", "Zww", "Zuw", "Zqq", "Zuq", "Kvv", "Kuv"),
         **_same("Kpp", "Kup", "Krr", "Kur", "Mww", "Muw", "Mqq", "Muq", "Nvv", "Nuv", "Nrr", "Nur"),
-        "Xuuvv": Entry("u u |v| v", _EVEN["vv"], side="v", remark=_ODD),
-        "Xuuww": Entry("u u |w| w", _EVEN["ww"], side="w", remark=_ODD),
+        "Xuuvv": Entry("u u |v| v", "Xuuvv", side="v", remark=_ODD),
+        "Xuuww": Entry("u u |w| w", "Xuuww", side="w", remark=_ODD),
         "Xrr": Entry("|r| r", "Xrr", side="r", remark=_ODD),
         "Xuv": Entry("u v", remark=_LINEAR),
         "Xuw": Entry("u w", remark=_LINEAR),
