@@ -11,7 +11,7 @@ OUT    ?= hokie
 ENGINE := hatch_build.py $(wildcard src/towtank/symbols.py src/towtank/engine/*.py src/towtank/engine/c/* \
             src/towtank/model/*.py src/towtank/pilot/*.py)
 
-.PHONY: help install run test lint bench bench-engine validate validate-slurm clean
+.PHONY: help install run test lint bench bench-engine bench-derive validate validate-slurm clean
 .DEFAULT_GOAL := help
 
 help:
@@ -19,10 +19,11 @@ help:
 	@echo "make run       towtank run hokie, results in ./$(OUT)"
 	@echo "make test      ruff, mypy, import-linter, pytest"
 	@echo "make lint      the first three of these"
-	@echo "make validate  the longer checks; rewrites the validation table of the report"
+	@echo "make validate  the longer checks; rewrites the tables in validation/ and that of the report"
 	@echo "make validate-slurm  work shared by jobs of a real one-node Slurm; as root, with Debian's Slurm installed"
 	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
 	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
+	@echo "make bench-derive  identification of 200 runs of 2000 samples, written to bench/derive.json"
 	@echo "make clean     remove $(VENV)/, caches and bench/"
 
 install: $(VENV)/.engine
@@ -56,6 +57,8 @@ test: lint
 
 validate: $(VENV)/.tools
 	$(BIN)/python validation/suboff.py
+	OMP_NUM_THREADS=1 $(BIN)/python validation/interval_coverage.py
+	$(BIN)/python validation/prediction.py
 	$(BIN)/pytest -m validate
 
 validate-slurm: $(VENV)/.engine $(VENV)/.tools
@@ -66,6 +69,9 @@ bench: $(VENV)/.engine
 
 bench-engine: $(VENV)/.engine $(VENV)/.tools
 	$(BIN)/python benchmarks/engine.py
+
+bench-derive: $(VENV)/.engine
+	$(BIN)/python benchmarks/derive.py
 
 clean:
 	rm -rf $(VENV) bench build dist src/towtank/engine/lib .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

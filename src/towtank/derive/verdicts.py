@@ -183,9 +183,10 @@ def tested(runs: Sequence[Run], samples: Samples, solved: Solved) -> list[dict[s
     fits = measure.misfits(runs, solved, out, found, scale)
     weight = measure.influence(solved, out, KEY_TERMS, INFLUENCE_FLOOR)
     ties = measure.ties_of(solved, solved.choice.order)
+    kinds = [family_of(run) if run.steady else "" for run in runs]
     tests: list[dict[str, Tested]] = []
     for i, run in enumerate(runs):
-        mine = {"lack of fit": Tested(float(fits[i, 0]), float(fits[i, 1]) or _kind_spread(runs, fits, i))}
+        mine = {"lack of fit": Tested(float(fits[i, 0]), float(fits[i, 1]) or _kind_spread(kinds, fits, i))}
         if wave := found.get(i):
             without = solved.fit.unknowns[:, 0] + out.change[i]
             contents = measure.contents(run, wave, without, ties, scale)
@@ -247,8 +248,10 @@ def _worst_of_kinds(runs: Sequence[Run], verdicts: Sequence[Verdict], given: Map
     return sorted(i for _, i in worst.values())
 
 
-def _kind_spread(runs: Sequence[Run], fits: Array, number: int) -> float:
-    """What the scatter of a steady run's kind may show of it; 0 for an oscillation and for a kind of two or less."""
-    kind = family_of(runs[number])
-    others = [fits[i, 0] for i, run in enumerate(runs) if i != number and run.steady and family_of(run) == kind]
-    return KIND_SPREAD * float(np.median(others)) if runs[number].steady and len(others) > 1 else 0.0
+def _kind_spread(kinds: Sequence[str], fits: Array, number: int) -> float:
+    """What the scatter of a steady run's kind may show of it; 0 for a kind of two or less.
+
+    kinds : that of each steady run, empty for an oscillation, of which 0 is given.
+    """
+    others = [fits[i, 0] for i, kind in enumerate(kinds) if i != number and kind == kinds[number]]
+    return KIND_SPREAD * float(np.median(others)) if kinds[number] and len(others) > 1 else 0.0

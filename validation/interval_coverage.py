@@ -1,8 +1,8 @@
 """How often the stated 95 % interval of a derivative holds the truth, on synthetic campaigns.
 
 The standard plan of "hokie" is towed with known coefficients, noise is added, and ``derive`` is asked for values and
-intervals. Run as a script, it writes ``validation/coverage.csv``: one row for each kind of noise and term, and one for
-all terms together. ``python validation/coverage.py 50`` takes 50 campaigns of each kind of noise.
+intervals. Run as a script, it writes ``validation/interval_coverage.csv``: one row for each kind of noise and term, and
+one for all terms together. ``python validation/interval_coverage.py 50`` takes 50 campaigns of each kind of noise.
 """
 
 from __future__ import annotations
