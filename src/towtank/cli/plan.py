@@ -90,8 +90,13 @@ def plan(
         chain = open_chain(reply, craft, out, speed)
         chain.prepare()
         if optimal and budget is not None:
-            words = {"budget": budget, "aim": aim or "all", "cost": cost or "cfd", "criterion": criterion or "D"}
-            _tell_optimal(reply, _optimal(chain, words | {"rehearse": rehearse or 0}))
+            words = {
+                "budget": budget,
+                "aim": "all" if aim is None else aim,
+                "cost": cost or "cfd",
+                "criterion": criterion or "D",
+            }
+            _tell_optimal(reply, _optimal(chain, words | {"rehearse": rehearse}))
         else:
             chain.make_plan()
         _tell(reply, chain)
@@ -133,8 +138,11 @@ def _optimal(chain: Chain, words: dict[str, Any]) -> dict[str, Any]:
     from towtank.errors import ArtefactError
     from towtank.experiments.cost import cost_model
     from towtank.experiments.files import own_plan, read_optimal, write_optimal
+    from towtank.experiments.rehearsal import check_campaigns
     from towtank.provenance import digest
 
+    if words["rehearse"] is not None:
+        check_campaigns(words["rehearse"])
     study, path = chain.study, chain.study.root / "optimal.json"
     model = cost_model(words["cost"])
     asked = words | {"cost": asdict(model), "derivatives": file_hash(study.derivatives), "program": program_hash()}
@@ -171,16 +179,18 @@ def _choose(chain: Chain, words: dict[str, Any]) -> Optimal:
     )
 
 
-def _rehearsals(best: Optimal, campaigns: int) -> dict[str, Any]:
+def _rehearsals(best: Optimal, campaigns: int | None) -> dict[str, Any]:
     from towtank.experiments.rehearsal import rehearse
 
-    if not campaigns or best.problem is None:
+    if campaigns is None or best.problem is None:
         return {}
     sets = {"chosen": best.chosen, "equal_cost": best.equal, "standard_bearing": best.bearing}
     return {name: rehearse(best.problem, best.problem.numbers(runs.runs), campaigns) for name, runs in sets.items()}
 
 
 def _tell_optimal(reply: Reply, found: dict[str, Any]) -> None:
+    from towtank.experiments.files import saving
+
     keys = ("aim", "criterion", "budget", "loads", "saves", "equal_cost", "least", "least_size", "rehearsal")
     reply.summary["optimal"] = {
         key: found[key] for key in (*keys, "chosen", "standard", "standard_bearing", "not_determined")
@@ -197,7 +207,7 @@ def _tell_optimal(reply: Reply, found: dict[str, Any]) -> None:
         reply.say(f"  {name:<12}" + "".join(f"{_share(item['std'][name], base[name]):>12}" for item in sets.values()))
     if len(found["aim"]) > LISTED:
         reply.say(f"  and {len(found['aim']) - LISTED} more in {reply.files['optimal']}")
-    reply.say(_saving(found))
+    reply.say(saving(found))
     if found["not_determined"]:
         reply.say(f"Not determined by this plan: {', '.join(found['not_determined'])}.")
     for name, done in found["rehearsal"].items():
@@ -210,23 +220,3 @@ def _tell_optimal(reply: Reply, found: dict[str, Any]) -> None:
 
 def _share(value: float | None, base: float | None) -> str:
     return "-" if value is None or not base else f"{value / base:.2f}"
-
-
-def _saving(found: dict[str, Any]) -> str:
-    saves, least, size = found["saves"], found["least"], found["least_size"]
-    ratio = found["equal_cost"]["size_ratio"]
-    at_equal = (
-        ""
-        if ratio is None
-        else f" At equal cost the uncertainty is {ratio:.2f} of the standard plan's (geometric mean)."
-    )
-    by_size = (
-        "" if size is None else f" In the geometric mean, {size['number']} runs of cost {size['cost']:.1f} are enough."
-    )
-    if least is None:
-        return f"No smaller plan was found that leaves every value as certain as the standard one.{by_size}{at_equal}"
-    return (
-        f"Saves {saves['runs']:g} runs of {saves['of_runs']:g} that bear on it in the standard plan, and "
-        f"{saves['cost']:.1f} of {saves['of_cost']:.1f} in cost: {least['number']} runs leave every value as certain."
-        f"{by_size}{at_equal}"
-    )

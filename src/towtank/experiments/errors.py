@@ -65,19 +65,28 @@ class ErrorModel:
         return np.asarray(self.repeated + (1.0 - self.repeated) / np.maximum(cycles, 1.0))
 
     def weight_factor(self, cycles: float) -> float:
-        """Factor on the variance of a result whose weights are found from the residual of each oscillation.
-
-        The mean square of the error of one run has few degrees of freedom n, so a weight w = 1 / mean square is itself
-        uncertain: E(w^2) / E(w)^2 = (n - 2) / (n - 4).
-
-        Source     atkinson2007 has the weights known; this is the moment of the inverse chi-square distribution.
-        Valid      n above 5; below it the factor at 5 is given.
-        """
+        """Factor on the variance of a result because an oscillation is weighted by its own residual."""
         m, own = float(self.components), self.repeated + (1.0 - self.repeated) / cycles
         fresh = (1.0 - self.repeated) * (1.0 - 1.0 / cycles)
         freedom = m / (own**2 + fresh**2 / max(cycles - 1.0, 1.0))
-        freedom = max(freedom, 5.0)
-        return (freedom - 2.0) / (freedom - 4.0)
+        return float(found_weight(freedom))
+
+
+FITTED = 2
+"""Values of a load that a steady kind fits from its own runs, slope and bend: they take that much from its residual."""
+
+
+def found_weight(freedom: float | Array) -> Array:
+    """Factor on the variance of a result whose weights are 1 / mean square of a residual of n degrees of freedom.
+
+    Such a weight w is itself uncertain: E(w^2) / E(w)^2 = (n - 2) / (n - 4).
+
+    Source     atkinson2007 has the weights known; this is the moment of the inverse chi-square distribution.
+    Valid      n above 5; below it the factor at 5 is given. A bound where one kind of run alone tells a value: its
+               weight then does not matter.
+    """
+    kept = np.maximum(freedom, 5.0)
+    return np.asarray((kept - 2.0) / (kept - 4.0))
 
 
 def shapes(error: ErrorModel, samples: int, steady: bool) -> Array:

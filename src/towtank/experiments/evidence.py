@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import typing
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from towtank.craft.craft import Craft
 from towtank.derive import weights
-from towtank.derive.cycles import settled
+from towtank.derive.cycles import family_of, settled
 from towtank.derive.expand import expand
 from towtank.derive.origin import WINDOW_DEG, WINDOW_TURN
 from towtank.derive.select import GATED, choose, independent
 from towtank.derive.system import System, build, tie_matrix
 from towtank.errors import InputError
-from towtank.experiments.errors import ErrorModel, shapes
+from towtank.experiments.errors import FITTED, ErrorModel, found_weight, shapes
 from towtank.experiments.exchange import PRIOR, Grid
 from towtank.experiments.forecast import Forecast
 from towtank.frames import Array
@@ -27,6 +29,9 @@ KEPT = 1e-10
 """Share of the largest eigenvalue of a run's information below which a direction is round-off."""
 CONFUSED = 1e-2 / PRIOR
 """Growth of a variance by the other unknowns above which the prior, not the runs, tells the values apart."""
+
+ROUND_OFF = 1e-12
+"""Share of the information on an unknown that is left by subtraction when no run holds it."""
 
 SLOPES = ("Yuv", "Nuv", "Yur", "Nur")
 """Slopes at the origin that the horizontal stability index is made of."""
@@ -40,7 +45,8 @@ class Evidence:
     across (R, L, n, m) : mean over a cycle of regressor times component.
     sigma (R, L) : standard deviation of the load.   witness (R,) : variance of a component of unit variance.
     components (R,) : in how many components the variance is spread.
-    found (R,) : factor on the variance because the weight of a run is found from its own residual.
+    found (R,) : factor on the variance because the weight of an oscillation is found from its own residual.
+    family (R,) : of steady runs, which are weighted together by the residual of all; empty for the others.
     wanted : name -> combination (n,) of the unknowns.   local : True for the slopes at the origin.
     """
 
@@ -51,6 +57,7 @@ class Evidence:
     witness: Array
     components: Array
     found: Array
+    family: tuple[str, ...]
     wanted: Mapping[str, Array]
     local: bool = False
 
@@ -68,6 +75,19 @@ class Evidence:
             wanted = wanted / unit[:, None]
         return Grid(_rows(scaled), cost, wanted, PRIOR * np.eye(len(norm)), criterion)
 
+    @cached_property
+    def noise(self) -> Array:
+        """Mean product (R, L, n, n) of regressors and error, for an error of unit standard deviation."""
+        factor = self.witness / self.components
+        return np.asarray(np.einsum("r,rlim,rljm->rlij", factor, self.across, self.across, optimize=True))
+
+    def weight_factor(self, chosen: Sequence[int]) -> Array:
+        """Factor (len(chosen),) on the variance of each run because its weight is found from residuals."""
+        size = Counter(self.family[i] for i in chosen)
+        freedom = np.array([float(size[self.family[i]] - FITTED) for i in chosen])
+        alone = np.array([not self.family[i] for i in chosen])
+        return np.asarray(np.where(alone, self.found[list(chosen)], found_weight(freedom)))
+
     def covariance(self, chosen: Sequence[int], weight: Array) -> Array:
         """Covariance (s, s) of the wanted values, of a weighted fit to the runs ``chosen``.
 
@@ -75,22 +95,39 @@ class Evidence:
 
         Source     cameronmiller2015, section II (variance of a weighted fit whose errors are not as weighted).
         """
+        information, middle = self._parts(chosen, weight)
+        return self._sandwich(information.sum(axis=0), middle.sum(axis=0))
+
+    def without_each(self, chosen: Sequence[int], weight: Array) -> Array:
+        """Covariances (len(chosen), s, s) without each run of ``chosen`` in turn, the others weighted as before."""
+        information, middle = self._parts(chosen, weight)
+        return self._sandwich(information.sum(axis=0) - information, middle.sum(axis=0) - middle)
+
+    def _parts(self, chosen: Sequence[int], weight: Array) -> tuple[Array, Array]:
+        """Information and its noise (len(chosen), n, n) of each run."""
         at = list(chosen)
-        information = np.einsum("rl,rlij->ij", weight, self.square[at], optimize=True)
-        noise = (weight * self.sigma[at]) ** 2 * (self.found[at] * self.witness[at] / self.components[at])[:, None]
-        middle = np.einsum("rl,rlim,rljm->ij", noise, self.across[at], self.across[at], optimize=True)
-        held = np.diag(information) > 0.0
-        norm = np.sqrt(np.where(held, np.diag(information), 1.0))
-        prior = PRIOR * np.eye(len(norm))
-        inverse = np.linalg.inv(information / np.outer(norm, norm) + prior)
+        information = np.einsum("rl,rlij->rij", weight, self.square[at], optimize=True)
+        noise = self.weight_factor(at)[:, None] * (weight * self.sigma[at]) ** 2
+        return information, np.einsum("rl,rlij->rij", noise, self.noise[at], optimize=True)
+
+    def _sandwich(self, information: Array, middle: Array) -> Array:
+        """Covariances (..., s, s) of the wanted values."""
+        own = np.einsum("...ii->...i", information)
+        held = own > ROUND_OFF * own.max(axis=tuple(range(own.ndim - 1)), initial=0.0)
+        norm = np.sqrt(np.where(held, own, 1.0))
+        square = norm[..., :, None] * norm[..., None, :]
+        prior = PRIOR * np.eye(own.shape[-1])
+        inverse = np.linalg.inv(information / square + prior)
         # The prior is an observation of its own, so that what the runs leave open stays open.
-        unknown = inverse @ (middle / np.outer(norm, norm) + prior) @ inverse
+        unknown = inverse @ (middle / square + prior) @ inverse
         combinations = np.array(list(self.wanted.values()))
-        scaled = combinations / norm
-        out = np.asarray(scaled @ unknown @ scaled.T)
-        open_ = np.any((combinations != 0.0) & ~held, axis=1)
-        open_ |= np.einsum("si,ij,sj->s", scaled, inverse, scaled) > CONFUSED * (scaled**2).sum(axis=1)
-        out[open_, open_] = np.inf
+        scaled = combinations / norm[..., None, :]
+        out = np.asarray(scaled @ unknown @ np.swapaxes(scaled, -1, -2))
+        open_ = np.any((combinations != 0.0) & ~held[..., None, :], axis=-1)
+        spread = np.einsum("...si,...ij,...sj->...s", scaled, inverse, scaled)
+        open_ |= spread > CONFUSED * (scaled**2).sum(axis=-1)
+        diagonal = np.einsum("...ss->...s", out)
+        diagonal[open_] = np.inf
         return out
 
 
@@ -129,7 +166,10 @@ def wide_evidence(cast: Forecast, error: ErrorModel, wanted: Sequence[str]) -> E
     cycles = np.array([1.0 if run.steady else max(run.periods - 1.0, 1.0) for run in runs])
     spread = np.array([1.0 if run.steady else float(error.components) for run in runs])
     found = np.array([1.0 if run.steady else error.weight_factor(c) for run, c in zip(runs, cycles, strict=True)])
-    return Evidence(choice.unknowns, square, across, cast.sigma, error.witness(cycles), spread, found, combinations)
+    family = tuple(family_of(run) if run.steady else "" for run in runs)
+    return Evidence(
+        choice.unknowns, square, across, cast.sigma, error.witness(cycles), spread, found, family, combinations
+    )
 
 
 def _all(unknowns: Sequence[str], rows: Mapping[str, Array]) -> dict[str, Array]:
@@ -189,7 +229,9 @@ def index_evidence(cast: Forecast, error: ErrorModel, craft: Craft) -> Evidence:
     for name, part in gradient(cast.slopes, craft).items():
         slope[names.index(name)] = part
     ones = np.ones(len(runs))
-    return Evidence(names, square, across, sigma, error.witness(ones), ones, ones, {"G_h": slope}, local=True)
+    return Evidence(
+        names, square, across, sigma, error.witness(ones), ones, ones, ("",) * len(runs), {"G_h": slope}, True
+    )
 
 
 def stability_index(slopes: Mapping[str, float], craft: Craft) -> float:
@@ -246,7 +288,7 @@ def fit_weights(cast: Forecast, chosen: Sequence[int], weight_steady: float | No
     count = np.array([len(run.settled) if not run.steady else 1 for run in runs], dtype=float)
     expected = _Expected(cast.sigma[at] ** 2 * count[:, None], cast.rms[at] ** 2 * count[:, None], count)
     system = typing.cast(System, expected)
-    share = weights.family(system, runs, weights.WEIGHT_STEADY if weight_steady is None else weight_steady)
+    share = weights.family(system, runs, weights.default_share(runs) if weight_steady is None else weight_steady)
     return np.asarray(share * count[:, None] / weights.spread(system, runs, np.zeros(0)) ** 2)
 
 

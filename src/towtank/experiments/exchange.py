@@ -70,7 +70,7 @@ class Grid:
             return np.asarray((np.trace(spread) - fall) / s)
         size = np.sqrt(np.diag(spread))
         root = np.linalg.cholesky(spread / np.outer(size, size))
-        white = np.swapaxes(np.linalg.solve(root, np.swapaxes(across / size, 1, 2)), 1, 2)
+        white = (across / size) @ np.linalg.inv(root).T
         left = np.linalg.slogdet(inner - white @ np.swapaxes(white, 1, 2))[1]
         return np.asarray((np.linalg.slogdet(spread)[1] + left - np.linalg.slogdet(inner)[1]) / s)
 

@@ -98,6 +98,27 @@ def optimal_document(optimal: Optimal) -> dict[str, Any]:
     }
 
 
+def saving(found: Mapping[str, Any]) -> str:
+    """What the content of ``optimal.json`` saves, in words."""
+    saves, least, size = found["saves"], found["least"], found["least_size"]
+    ratio = found["equal_cost"]["size_ratio"]
+    at_equal = (
+        ""
+        if ratio is None
+        else f" At equal cost the uncertainty is {ratio:.2f} of the standard plan's (geometric mean)."
+    )
+    by_size = (
+        "" if size is None else f" In the geometric mean, {size['number']} runs of cost {size['cost']:.1f} are enough."
+    )
+    if least is None:
+        return f"No smaller plan was found that leaves every value as certain as the standard one.{by_size}{at_equal}"
+    return (
+        f"Saves {saves['runs']:g} runs of {saves['of_runs']:g} that bear on it in the standard plan, and "
+        f"{saves['cost']:.1f} of {saves['of_cost']:.1f} in cost: {least['number']} runs leave every value as certain."
+        f"{by_size}{at_equal}"
+    )
+
+
 def plain(scored: Scored) -> dict[str, Any]:
     """``scored`` as JSON content."""
     return {

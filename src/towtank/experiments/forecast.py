@@ -68,7 +68,7 @@ def forecast(pool: Plan, error: ErrorModel, known: Derivatives | None = None) ->
         )
     runs = tow(pool, FastTank(members=0))
     standard = tuple(standard_within(pool, pool.speed))
-    found = derive([runs[i] for i in standard])
+    found = derive([runs[i] for i in standard], screening=False)
     misfit = np.array([_rms(run.loads - _loads(found, run), run) for run in runs])
     source = "fast tank, nominal constants (semi-empirical)"
     if known is not None:

@@ -16,7 +16,7 @@ from towtank.experiments.candidates import candidates
 from towtank.experiments.cost import CFD, CostModel, costs
 from towtank.experiments.errors import ErrorModel
 from towtank.experiments.evidence import Evidence, fit_weights, index_evidence, stability_index, wide_evidence
-from towtank.experiments.exchange import Design, Grid, optimise
+from towtank.experiments.exchange import BETTER, Design, Grid, exchange, optimise
 from towtank.experiments.forecast import Forecast, forecast
 from towtank.frames import Array
 from towtank.plan.kinds import Plan
@@ -27,8 +27,9 @@ CRITERIA = ("D", "A")
 BEARS = 0.01
 """Smallest share of the information on an unknown for which a run of the standard plan bears on the aim."""
 
-ROUNDS = 4
-"""Searches with the lagging values counted more, after which a number of runs is given up."""
+
+ROUNDS = 8
+"""Most searches with the lagging values counted more (judgement: later ones move a value by a few per cent)."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def optimal_plan(
     Departure  Errors of the runs, and the allowance for what the model cannot hold, are those of ``ErrorModel``.
     Valid      The range of the fit: drift to 20 deg, fins to 20 deg, ahead. Errors of different runs independent.
     """
-    _refuse(budget, criterion)
+    _refuse(budget, criterion, tuple(aim))
     told = ErrorModel() if error is None else error
     cast = forecast(candidates(craft, speed, violent=violent), told, known)
     problem = Problem(
@@ -147,8 +148,8 @@ def optimal_plan(
         aim=tuple(problem.evidence.wanted), criterion=criterion, budget=budget, values=_values(problem),
         source=cast.source, error=told, cost_model=cost, unit=problem.unit, candidates=len(cast.runs), chosen=chosen,
         standard=problem.score(cast.standard), bearing=problem.score(problem.bearing),
-        equal=problem.score(problem.equal.chosen), least=None if least is None else problem.score(least.chosen),
-        least_size=None if least_size is None else problem.score(least_size.chosen),
+        equal=problem.score(problem.equal.chosen), least=None if least is None else problem.score(least),
+        least_size=None if least_size is None else problem.score(least_size),
         open_terms=problem.open(design.chosen), values_of_search=design.values, problem=problem,
     )  # fmt: skip
 
@@ -216,10 +217,7 @@ class Problem:
         """What a set of runs costs and leaves."""
         covariance = self.covariance(chosen)
         std = np.sqrt(np.diag(covariance))
-        size = math.inf
-        if np.isfinite(std).all():
-            correlation = np.linalg.slogdet(covariance / np.outer(std, std))[1]
-            size = float(np.exp((2.0 * np.log(std).sum() + correlation) / (2.0 * len(std))))
+        size = math.exp(float(_volume(covariance)))
         names = tuple(self.cast.pool.tests[i].name for i in chosen)
         cost = float(self.cost[list(chosen)].sum()) / self.unit
         return Scored(names, cost, dict(zip(self.evidence.wanted, std.tolist(), strict=True)), size)
@@ -228,54 +226,56 @@ class Problem:
         """The best design of at most ``runs`` runs that cost no more than as many mean runs of the standard plan."""
         return optimise(self.grid, runs, runs * self.unit, starts)
 
-    def excess(self, design: Design) -> Array:
-        """Standard deviation (s,) of each wanted value over that by the standard plan."""
-        std = np.sqrt(np.diag(self.covariance(design.chosen)))
+    def least(self) -> tuple[int, ...] | None:
+        """The smallest set found with no wanted value more uncertain than by the standard plan."""
+        return self._thinned(self._balanced(), self._worst, 1.0)
+
+    def least_size(self) -> tuple[int, ...] | None:
+        """The smallest set found whose ellipsoid is no larger than that of the standard plan."""
+        return self._thinned(self.equal, _volume, float(_volume(self.covariance(self.cast.standard))))
+
+    def _excess(self, covariance: Array) -> Array:
+        """Standard deviation (..., s) of each wanted value over that by the standard plan; covariance (..., s, s)."""
+        std = np.sqrt(np.einsum("...ss->...s", covariance))
         return np.asarray(np.where(np.isfinite(self.target), std / self.target, 0.0))
 
-    def reaching(self, runs: int) -> Design | None:
-        """A design of at most ``runs`` runs with no wanted value more uncertain than by the standard plan, if found.
+    def _worst(self, covariance: Array) -> Array:
+        return np.asarray(self._excess(covariance).max(axis=-1))
 
-        The best by the criterion, then A-optimal ones in which the values that lag are counted more each round.
-        """
-        design = self.best(runs, starts=1)
-        grid = replace(self.grid, criterion="A")
+    def _balanced(self) -> Design:
+        """``equal`` exchanged so that no value lags: A-optimal, laggards counted more each round; the best round."""
+        found, grid = [self.equal], replace(self.grid, criterion="A")
+        budget = float(self.cost[list(self.bearing)].sum())
         for _ in range(ROUNDS):
-            excess = self.excess(design)
-            if np.all(excess <= 1.0 + 1e-9):
-                return design
+            excess = self._excess(self.covariance(found[-1].chosen))
             if not np.isfinite(excess).all():
-                return None
+                break
             grid = replace(grid, wanted=grid.wanted * excess[:, None])
-            design = optimise(grid, runs, runs * self.unit, starts=1)
-        return design if np.all(self.excess(design) <= 1.0 + 1e-9) else None
+            found.append(exchange(grid, found[-1].chosen, len(self.bearing), budget))
+        return min(found, key=lambda design: float(self._worst(self.covariance(design.chosen))))
 
-    def least(self) -> Design | None:
-        """The smallest design found that is ``reaching``, no larger than the runs that bear on the aim."""
-        return self._smallest(self.reaching)
+    def _thinned(self, start: Design, measure: Callable[[Array], Array], limit: float) -> tuple[int, ...] | None:
+        """``start`` without the runs that it can spare while ``measure`` stays within ``limit``.
 
-    def least_size(self) -> Design | None:
-        """The smallest design found whose ellipsoid is no larger than that of the standard plan."""
-        size = self.score(self.cast.standard).size * (1.0 + 1e-9)
+        Each time the run goes that raises ``measure`` least for its cost. None when ``start`` itself is beyond.
+        """
+        limit += BETTER * max(abs(limit), 1.0)
+        chosen = list(start.chosen)
+        if not measure(self.covariance(chosen)) <= limit:
+            return None
+        while (rest := self._spared(chosen, measure, limit)) is not None:
+            chosen = rest
+        return tuple(chosen)
 
-        def tried(runs: int) -> Design | None:
-            design = self.best(runs, starts=1)
-            return design if self.score(design.chosen).size <= size else None
-
-        return self._smallest(tried)
-
-    def _smallest(self, attempt: Callable[[int], Design | None]) -> Design | None:
-        """By bisection over the number of runs, up to those that bear on the aim."""
-        low, high = 0, len(self.bearing)
-        found = attempt(high)
-        while found is not None and high - low > 1:
-            middle = (low + high) // 2
-            tried = attempt(middle)
-            if tried is None:
-                low = middle
-            else:
-                found, high = tried, middle
-        return found
+    def _spared(self, chosen: list[int], measure: Callable[[Array], Array], limit: float) -> list[int] | None:
+        left = measure(self.evidence.without_each(chosen, self.weight(chosen)))
+        dear = np.where(left <= limit, (left - measure(self.covariance(chosen))) / self.cost[chosen], np.inf)
+        for at in np.argsort(dear)[: np.isfinite(dear).sum()]:
+            rest = [*chosen[:at], *chosen[at + 1 :]]
+            # The weights change with the set, so it is judged anew.
+            if measure(self.covariance(rest)) <= limit:
+                return rest
+        return None
 
     def open(self, chosen: Sequence[int]) -> tuple[str, ...]:
         """Unknowns that the runs hold nothing of."""
@@ -292,18 +292,30 @@ class Problem:
         return "Aim at fewer terms with --for."
 
 
-def _refuse(budget: int, criterion: str) -> None:
+def _volume(covariance: Array) -> Array:
+    """Logarithm of the geometric mean of the axes of the ellipsoids of covariances (..., s, s); infinite when open."""
+    std = np.sqrt(np.einsum("...ss->...s", covariance))
+    closed = np.isfinite(std).all(axis=-1)
+    std = np.where(closed[..., None], std, 1.0)
+    correlation = np.where(
+        closed[..., None, None], covariance / (std[..., :, None] * std[..., None, :]), np.eye(std.shape[-1])
+    )
+    log = (2.0 * np.log(std).sum(axis=-1) + np.linalg.slogdet(correlation)[1]) / (2.0 * std.shape[-1])
+    return np.asarray(np.where(closed, log, np.inf))
+
+
+def _refuse(budget: int, criterion: str, aim: tuple[str, ...]) -> None:
     if budget < 1:
         raise InputError(f"--budget {budget} is no number of runs. Give how many runs may be spent, such as 30.")
     if criterion not in CRITERIA:
         raise InputError(f"--criterion {criterion!r}: choose D (volume of the ellipsoid) or A (mean variance).")
-
-
-def _evidence(cast: Forecast, error: ErrorModel, craft: Craft, aim: tuple[str, ...]) -> Evidence:
     if not aim:
         raise InputError("--for names nothing. Name terms such as Yuv,Nuv, or index, or all.")
     if len(aim) > 1 and {"all", "index"} & set(aim):
         raise InputError("--for: all and index stand alone. Name one of them, or a list of terms.")
+
+
+def _evidence(cast: Forecast, error: ErrorModel, craft: Craft, aim: tuple[str, ...]) -> Evidence:
     return index_evidence(cast, error, craft) if aim == ("index",) else wide_evidence(cast, error, aim)
 
 

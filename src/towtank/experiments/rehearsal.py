@@ -42,18 +42,14 @@ def rehearse(problem: Problem, chosen: Sequence[int], campaigns: int, seed: int 
     """Derive the wanted values from ``campaigns`` campaigns of the runs ``chosen``, each with its own errors.
 
     The loads are those of the predicted coefficients with errors of ``problem.error``; ``towtank.derive`` finds the
-    values again.
+    values again, without its screening: the prediction holds for the runs as given.
 
     Raises
     ------
     InputError
         Fewer than ``LEAST_SEEDS`` campaigns.
     """
-    if campaigns < LEAST_SEEDS:
-        raise InputError(
-            f"{campaigns} campaigns do not tell a spread: their standard deviation is known to "
-            f"{100.0 / np.sqrt(2.0 * max(campaigns, 1)):.0f} %. Give {LEAST_SEEDS} or more."
-        )
+    check_campaigns(campaigns)
     cast, at = problem.cast, list(chosen)
     plan = Plan(problem.craft, cast.pool.speed, tuple(cast.pool.tests[i] for i in at))
     exact = tow(plan, LpmTank(_truth(problem)))
@@ -61,9 +57,18 @@ def rehearse(problem: Problem, chosen: Sequence[int], campaigns: int, seed: int 
     found = np.zeros((campaigns, len(names)))
     for number in range(campaigns):
         runs = [disturbed(run, cast.sigma[i], problem.error, seed + number) for run, i in zip(exact, at, strict=True)]
-        found[number] = _wanted(derive(runs), names, problem.craft)
+        found[number] = _wanted(derive(runs, screening=False), names, problem.craft)
     predicted = np.array(list(problem.score(chosen).std.values()))
     return Rehearsal(names, found, np.asarray(found.std(axis=0, ddof=1)), predicted)
+
+
+def check_campaigns(campaigns: int) -> None:
+    """Refuse too few campaigns."""
+    if campaigns < LEAST_SEEDS:
+        raise InputError(
+            f"{campaigns} campaigns do not tell a spread: their standard deviation is known to "
+            f"{100.0 / np.sqrt(2.0 * max(campaigns, 1)):.0f} %. Give {LEAST_SEEDS} or more."
+        )
 
 
 def _truth(problem: Problem) -> dict[str, float]:
