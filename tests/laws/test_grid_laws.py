@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from grid_cases import HOKIE, VALUES, made
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towtank import read_craft
 from towtank.errors import InputError
 from towtank.grid.estimate import DIVERGENT, OSCILLATORY, estimate
 from towtank.grid.fast import RESOLUTIONS, fast_grid_study, grid_plan, tow_on_meshes
@@ -23,18 +23,13 @@ from towtank.grid.quantities import considerable, measures
 from towtank.grid.spread import mesh_uncertainty
 from towtank.grid.study import GridStudy, grid_study
 from towtank.plan.kinds import CaptiveTest
-from towtank.plan.motion import Drift, Sway, Yaw
+from towtank.plan.motion import Drift
 from towtank.progress import Silent
 from towtank.tank.fast.build import build, panel_counts
 from towtank.tank.fast.tank import FastTank
-from towtank.tank.lpm import LpmTank
-from towtank.tank.run import Run
 
-HOKIE = read_craft("hokie")
 ORDERS = st.floats(0.3, 3.0)
 RATIOS = st.floats(1.2, 3.0)
-VALUES = {"Xudot": -1.0, "Yvdot": -40.0, "Nrdot": -60.0, "Yrdot": 3.0, "Nvdot": 3.0, "Xuu": -4.0, "Yuv": -30.0,
-          "Yvv": -200.0, "Nuv": -20.0, "Yur": 15.0, "Nur": -35.0}  # fmt: skip
 
 
 def power_law(order: float, size: np.ndarray, amplitude: float = 0.4, limit: float = 2.0) -> np.ndarray:
@@ -210,27 +205,6 @@ def test_sets_that_tell_nothing_are_refused(phi: tuple, size: tuple, words: str)
 
 
 # --- runs
-
-
-def made(order: float, resolutions: tuple[float, ...], amplitude: float = 0.05) -> list[list[Run]]:
-    """Runs of known coefficients whose loads carry an error amplitude * h^order, h over that of the finest."""
-    tests = (
-        CaptiveTest("drift", 2.0, Drift(2.0, 0.15)),
-        CaptiveTest("sway", 2.0, Sway(2.0, 0.3, 1.1)),
-        CaptiveTest("yaw", 2.0, Yaw(2.0, 0.4, 1.3)),
-    )
-    tank = LpmTank(VALUES)
-    runs = [tank.run(HOKIE, test, Silent()) for test in tests]
-    return [
-        [
-            replace(
-                run, loads=run.loads * (1.0 + amplitude * (resolutions[-1] / r) ** order),
-                provenance={"mesh": {"label": f"m{r:g}", "cells": round(1e6 * r**3)}},
-            )
-            for run in runs
-        ]
-        for r in resolutions
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0])

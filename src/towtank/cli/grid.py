@@ -61,9 +61,11 @@ def grid(
     with answering("grid", json, debug) as reply:
         from towtank.grid.files import FILE, write_grid
         from towtank.grid.show import table
+        from towtank.grid.study import check_target
         from towtank.quantity import si
 
         share = si(target, "", "--target")
+        check_target(share)
         if len(places or []) > 1:
             study, root = _of_folders(places or [], share, resolutions), out or Path()
         else:
@@ -87,15 +89,15 @@ def _of_folders(places: list[str], share: float, resolutions: str | None) -> Gri
 def _of_craft(
     reply: Reply, craft: str | None, share: float, resolutions: str | None, out: Path | None
 ) -> tuple[GridStudy, Path]:
-    from towtank.grid.fast import RESOLUTIONS, fast_grid_study
+    from towtank.grid.fast import RESOLUTIONS, fast_grid_study, tanks_of
+    from towtank.tank.fast.tank import FastTank
 
     wanted = RESOLUTIONS if resolutions is None else _numbers(resolutions)
+    tanks_of(wanted, FastTank(members=0))  # refused before anything is written
     chain = open_chain(reply, craft, out).keep_speed()
     chain.prepare()
     root = chain.study.root
-    study = fast_grid_study(
-        chain.craft, resolutions=wanted, target=share, out=root, progress=Remarks(reply)
-    )  # fmt: skip
+    study = fast_grid_study(chain.craft, resolutions=wanted, target=share, out=root, progress=Remarks(reply))
     reply.file("runs", root / "grid")
     return study, root
 

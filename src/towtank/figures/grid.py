@@ -48,16 +48,16 @@ def convergence(study: GridStudy, name: str, ax: Axes | None = None) -> Axes:
     ax.errorbar(size, values, yerr=it.uncertainty, fmt="o", color=INK, markersize=3.6, elinewidth=0.8, capsize=2.5)
     at = study.number(study.chosen)
     ax.plot(size[at], values[at], "o", color=ORIGIN, markersize=9, fillstyle="none", label=f"chosen: {study.chosen}")
-    for h, value, mesh in zip(size, values, study.meshes, strict=True):
-        note(ax, f"{mesh.cells:,}".replace(",", " "), (h, value), (4, 4), color=GREY)
+    for h, top, mesh in zip(size, values + it.uncertainty, study.meshes, strict=True):
+        note(ax, f"{mesh.cells:,}".replace(",", " "), (h, top), (0, 3), color=GREY, ha="center")
     frame(ax, "mesh size over the finest", f"{item.load} {item.measure} [{UNITS[item.load]}]", zero=False)
-    ax.set_xlim(left=-0.08 * size[0])
-    ax.margins(y=0.15)
+    ax.set_xlim(-0.08 * size[0], 1.08 * size[0])
+    ax.margins(y=0.2)
     head(
         ax,
-        f"{item.load} {item.measure}, {item.run}: {it.verdict}",
+        f"{item.load} {item.measure}, {item.run}",
         study.level,
-        f"{order_words(it)}; bars: 95 % bound of the mesh; numbers: cells",
+        f"{it.verdict}, {order_words(it)}; bars: 95 % bound; numbers: cells",
     )
     legend(ax)
     return ax

@@ -62,7 +62,19 @@ def tow_on_meshes(
     InputError
         Fewer than three resolutions, two that make the same mesh, or one out of range.
     """
-    base = FastTank(members=0) if tank is None else tank
+    tanks = tanks_of(resolutions, FastTank(members=0) if tank is None else tank)
+    folders = [None if out is None else Path(out) / "grid" / item.mesh["label"] for item in tanks]
+    return tuple(tow(plan, item, folder, progress) for item, folder in zip(tanks, folders, strict=True))
+
+
+def tanks_of(resolutions: Sequence[float], base: FastTank) -> list[FastTank]:
+    """``base`` at each resolution.
+
+    Raises
+    ------
+    InputError
+        As ``tow_on_meshes``.
+    """
     tanks = [replace(base, resolution=_snapped(resolution)) for resolution in resolutions]
     labels = [item.mesh["label"] for item in tanks]
     if len(set(labels)) < max(len(labels), LEAST_MESHES):
@@ -70,8 +82,7 @@ def tow_on_meshes(
             f"grid: resolutions {', '.join(f'{r:g}' for r in resolutions)} make the meshes {', '.join(labels)}. "
             f"An order needs {LEAST_MESHES} different ones; multiples of 1/3 give meshes that are alike."
         )
-    folders = [None if out is None else Path(out) / "grid" / label for label in labels]
-    return tuple(tow(plan, item, folder, progress) for item, folder in zip(tanks, folders, strict=True))
+    return tanks
 
 
 def _snapped(resolution: float) -> float:

@@ -143,8 +143,7 @@ def grid_study(sets: Sequence[Sequence[Run]], *, target: float = TARGET) -> Grid
     Source     celik2008, eca2014, ittc75030101: see ``estimate``.
     Valid      Meshes that are alike, refined everywhere by the same ratio; loads converged in time and iteration.
     """
-    if not 0.0 < target < 1.0:
-        raise InputError(f"grid: target {target:g} is not a share of a load between 0 and 1. 0.02 asks for 2 %.")
+    check_target(target)
     meshes, rows = matched(sets)
     sizes = np.array([mesh.size for mesh in meshes])
     check_sizes(sizes)
@@ -160,6 +159,12 @@ def grid_study(sets: Sequence[Sequence[Run]], *, target: float = TARGET) -> Grid
     return GridStudy(
         first.craft, " + ".join(levels), first.symmetry, meshes, quantities, target, chosen, met, words, known
     )
+
+
+def check_target(target: float) -> None:
+    """Refuse a bound that is not a share of a load."""
+    if not 0.0 < target < 1.0:
+        raise InputError(f"grid: target {target:g} is not a share of a load between 0 and 1. 0.02 asks for 2 %.")
 
 
 def _judged(row: Sequence[Run], sizes: np.ndarray) -> list[Quantity]:

@@ -12,6 +12,7 @@ from towtank.figures import forces, series
 from towtank.frames import drift_angle, incidence_angle
 from towtank.plan.kinds import Plan
 from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated
+from towtank.report.of_plan import chosen
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import STAGES, Study
 from towtank.tank.run import Run
@@ -34,10 +35,7 @@ def matrix(study: Study, book: Sketchbook) -> Section:
             )
     if study.plan is not None:
         blocks += [Text(f"Plan: {note}") for note in study.plan.notes[:12]]
-    if study.grid:
-        blocks.append(_grid(study))
-    else:
-        blocks.append(missing("There is no mesh study.", STAGES["grid"]))
+    blocks += chosen(study.optimal)
     return Section("tests", "Test matrix", tuple(blocks))
 
 
@@ -142,26 +140,6 @@ def _planned(plan: Plan) -> Table:
     kinds = dict.fromkeys(test.kind for test in plan.tests)
     rows = tuple((kind, str(sum(test.kind == kind for test in plan.tests))) for kind in kinds)
     return Table("Planned captive tests", ("Kind of test", "Tests"), rows, stated("", "motions are prescribed exactly"))
-
-
-def _grid(study: Study) -> Table:
-    quantities = study.grid.get("quantities", {})
-    rows = tuple(
-        (
-            name,
-            number(q.get("order")),
-            number(q.get("extrapolated")),
-            number(q.get("gci"), 3),
-            str(q.get("verdict", "")),
-        )
-        for name, q in quantities.items()
-    )
-    return Table(
-        "Mesh study",
-        ("Quantity", "Order", "Extrapolated value", "GCI", "Verdict"),
-        rows,
-        stated("rans", "GCI of the chosen mesh"),
-    )
 
 
 def _shares(runs: Sequence[Run], book: Sketchbook) -> list[Block]:

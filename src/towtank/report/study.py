@@ -13,6 +13,7 @@ from towtank.artefact import read_json
 from towtank.craft.craft import Craft
 from towtank.derive.table import Derivatives
 from towtank.errors import ArtefactError, InputError, TowtankError
+from towtank.grid.study import GridStudy
 from towtank.plan.kinds import Plan
 from towtank.tank.run import Run
 from towtank.trials.trajectory import Trajectory
@@ -30,7 +31,7 @@ STAGES = {
     "trials": "Pass trajectories, or run `towtank trial`.",
     "mc": "Pass the MonteCarlo, or run `towtank mc`.",
     "verdict": "Pass the Verdict, or run `towtank assess`.",
-    "grid": "The fast tank has no mesh; a mesh study belongs to CFD runs.",
+    "grid": "Pass the GridStudy, or run `towtank grid`.",
     "validation": "Run `make validate`, which compares the fast tank with published tests.",
 }
 """Stage -> what to do when it has left nothing."""
@@ -40,7 +41,7 @@ STAGES = {
 class Study:
     """Everything a report may show; any part may be absent.
 
-    index, grid, validation : documents as in trials/index.json, grid.json, validation.json.
+    index, optimal, validation : documents as in trials/index.json, optimal.json, validation.json.
     problems : (stage, message) of files that exist and cannot be read.
     remarks : what the reader must know about where a part came from.
     """
@@ -54,7 +55,8 @@ class Study:
     mc: MonteCarlo | None = None
     verdict: Verdict | None = None
     index: Mapping[str, Any] = field(default_factory=dict)
-    grid: Mapping[str, Any] = field(default_factory=dict)
+    grid: GridStudy | None = None
+    optimal: Mapping[str, Any] = field(default_factory=dict)
     validation: Mapping[str, Any] = field(default_factory=dict)
     problems: tuple[tuple[str, str], ...] = ()
     remarks: tuple[str, ...] = ()
@@ -152,6 +154,7 @@ def _flat(things: Iterable[Any]) -> Iterator[Any]:
 def _part(thing: Any) -> str:
     plain: tuple[tuple[type, str], ...] = (
         (Craft, "craft"), (Plan, "plan"), (Run, "runs"), (Derivatives, "derivatives"), (Trajectory, "trajectories"),
+        (GridStudy, "grid"),
     )  # fmt: skip
     for kind, name in plain:
         if isinstance(thing, kind):
@@ -164,8 +167,8 @@ def _part(thing: Any) -> str:
         if isinstance(thing, of):
             return name
     raise InputError(
-        f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, Derivatives, Model, Trajectory, "
-        "MonteCarlo, Verdict, or sequences of them."
+        f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, GridStudy, Derivatives, Model, "
+        "Trajectory, MonteCarlo, Verdict, or sequences of them."
     )
 
 
@@ -199,6 +202,8 @@ def read_study(folder: Path | str) -> Study:
 
     from towtank.craft.library import read_craft
     from towtank.derive.files import read_derivatives
+    from towtank.experiments.files import own_plan, read_optimal
+    from towtank.grid.files import read_grid
     from towtank.montecarlo.files import read_mc
     from towtank.plan.files import read_plan
     from towtank.verdict.files import read_verdict
@@ -217,8 +222,12 @@ def read_study(folder: Path | str) -> Study:
         mc=attempt("mc", root / "mc.json", lambda: read_mc(root)),
         verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
         index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
-        grid=attempt("grid", root / "grid.json", lambda: read_json(root / "grid.json", "towtank/grid/1"), {}),
+        grid=attempt("grid", root / "grid.json", lambda: read_grid(root / "grid.json")),
+        optimal=attempt("plan", root / "optimal.json", lambda: read_optimal(root / "optimal.json"), {}),
     )
+    if study.optimal and not own_plan(root):
+        words = "plan.toml is not the plan of optimal.json, which is left out."
+        study = replace(study, optimal={}, remarks=(*study.remarks, words))
     return completed(replace(study, problems=tuple(problems)))
 
 
