@@ -81,9 +81,8 @@ def test_the_interval_holds_the_limit_in_most_noisy_campaigns():
     inside = total = 0
     for seed in range(12):
         _, found = study(noise=0.02, seed=seed)
-        own = [
-            trend for trend in found.trends if trend.kind == "sway" and trend.term in ("Yvdot", "Nvdot", "Yuv", "Nuv")
-        ]
+        terms = ("Yvdot", "Nvdot", "Yuv", "Nuv")
+        own = [trend for trend in found.trends if trend.kind == "sway" and trend.term in terms]
         inside += sum(trend.low <= VALUES[trend.term] <= trend.high for trend in own)
         total += len(own)
     # 45.6 of 48 are expected; below 41 has a chance of 1 in 100 (binomial).

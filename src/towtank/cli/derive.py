@@ -43,7 +43,7 @@ Screening = Annotated[
     ),
 ]
 Frequencies = Annotated[
-    bool, typer.Option("--study", help="Also study frequency and amplitude of the oscillations: frequency.json.")
+    bool, typer.Option("--study", help="Also print how derivatives depend on frequency and amplitude.")
 ]
 
 
@@ -64,7 +64,7 @@ def derive(
     Every run is judged, and named where it is weighed down or rejected. A grid.json in the study folder enters the
     weights and the uncertainty. derivatives.json and model.json always hold the values about the body origin; what
     --about and --length ask for is printed and saved beside them as derivatives-about.json. --with, --steady and
-    --screening are kept for the next time.
+    --screening are kept for the next time. frequency.json holds the study of the oscillations.
 
     Example: towtank derive suboff-fins --about "2.013 m" --length "4.261 m"
 
@@ -152,10 +152,12 @@ def _tell_verdicts(reply: Reply, quality: Any) -> None:
 
 
 def _tell_frequencies(reply: Reply, chain: Chain) -> None:
-    from towtank.derive.study_files import study_table
+    from towtank.derive.study_files import read_frequencies, study_table
 
-    found, path = fitting.study_frequencies(chain)
-    reply.file("frequency", path)
+    if not chain.study.frequency.exists():
+        raise InputError("--study: the runs hold no oscillation, so there is no frequency to study. Leave it out.")
+    found = read_frequencies(chain.study.frequency)
+    reply.file("frequency", chain.study.frequency)
     reply.summary["recommended"] = {
         advice.kind: {"frequencies": advice.frequencies, "amplitudes": advice.amplitudes} for advice in found.advice
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,6 @@ from towtank.cli.study import file_hash
 
 if TYPE_CHECKING:
     from towtank.cli.chain import Chain
-    from towtank.derive.study import FrequencyStudy
     from towtank.derive.table import Derivatives
     from towtank.grid.study import GridStudy
 
@@ -30,35 +30,34 @@ def inputs(chain: Chain) -> dict[str, str]:
 
 
 def fit(chain: Chain) -> Derivatives:
-    """Derivatives of the runs of the study."""
+    """Derivatives of the runs of the study, checked against the sizes of the craft."""
+    from towtank.derive.consistency import consistency
     from towtank.derive.derive import derive
 
     wanted = asked(chain)
-    return derive(
+    derived = derive(
         chain.runs(),
         weight_steady=float(wanted["steady"]) if wanted["steady"] else None,
         screening=wanted["screening"] == "yes",
         grid=_grid(chain),
         optional=tuple(wanted["optional"].split(",")) if wanted["optional"] else (),
     )
-
-
-def study_frequencies(chain: Chain) -> tuple[FrequencyStudy, Path]:
-    """The frequency and amplitude study of the runs, and the file it was written to."""
-    from towtank.derive.study import frequency_study
-    from towtank.derive.study_files import FILE, write_frequencies
-
-    found = frequency_study(chain.runs(), chain.derivatives())
-    return found, write_frequencies(found, chain.study.root / FILE)
+    checks = [check.document() for check in consistency(derived, chain.craft)]
+    return replace(derived, quality={**derived.quality, "consistency": checks})
 
 
 def write(chain: Chain) -> Sequence[Path]:
-    """Fit, and write derivatives and model."""
+    """Fit, and write derivatives, model, and the study of frequency and amplitude where there are oscillations."""
     from towtank.derive.files import write_derivatives
+    from towtank.derive.study import frequency_study
+    from towtank.derive.study_files import write_frequencies
 
     derived = fit(chain)
     write_derivatives(derived, chain.replacing(chain.study.derivatives))
-    return chain.study.derivatives, chain.write_model()
+    files = [chain.study.derivatives, chain.write_model()]
+    if any(not run.steady for run in chain.runs()):
+        files.append(write_frequencies(frequency_study(chain.runs(), derived), chain.study.frequency))
+    return files
 
 
 def _grid_file(chain: Chain) -> Path:

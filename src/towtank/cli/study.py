@@ -64,6 +64,11 @@ class Study:
         return self.root / "derivatives.json"
 
     @property
+    def frequency(self) -> Path:
+        """How derivatives depend on frequency and amplitude."""
+        return self.root / "frequency.json"
+
+    @property
     def model(self) -> Path:
         """The self-contained model."""
         return self.root / "model.json"

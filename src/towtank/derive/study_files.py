@@ -13,7 +13,6 @@ from towtank.derive.study import Advice, FrequencyStudy, Gain, Loop, Point, Tren
 from towtank.errors import ArtefactError
 
 SCHEMA = "towtank/frequency/1"
-FILE = "frequency.json"
 Row = TypeVar("Row", Point, Trend, Loop, Advice, Gain)
 
 WORTH = 0.01
