@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
+from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from towtank.progress import Silent
 from towtank.tank.imported.gate import import_runs
 from towtank.tank.lpm import LpmTank
 
+DATA = Path(__file__).parents[1] / "data" / "import"
 SWAY = CaptiveTest("sway", 1.0, Sway(1.0, 0.8, 0.2), periods=3, samples=32)
 DRIFT = CaptiveTest("drift", 1.0, Drift(1.0, 0.1))
 TANK = LpmTank(known())
@@ -280,6 +284,17 @@ def test_of_restarts_that_overlap_the_later_one_holds(tmp_path):
     assert_right(run)
 
 
+def test_parts_of_a_run_named_in_any_order_are_put_in_that_of_time(tmp_path):
+    star_csv(tmp_path / "late.csv", TIME[48:], LOADS[48:])
+    star_csv(tmp_path / "early.csv", TIME[:56], LOADS[:56])
+    path = mapping(tmp_path)
+    text = path.read_text("utf-8").replace('file = "sway.csv"', 'files = ["late.csv", "early.csv"]')
+    path.write_text(text, encoding="utf-8")
+    (run,) = import_runs(path)
+    assert run.periods == 3
+    assert_right(run)
+
+
 def test_the_same_restart_twice_changes_nothing(tmp_path):
     case = tmp_path / "case" / "postProcessing" / "forces"
     forces_dat(case / "0" / "forces.dat", TIME, LOADS)
@@ -373,6 +388,39 @@ def test_decimal_commas_between_semicolons_or_tabs_are_understood(separator, tmp
     rows = [row.replace(",", separator).replace(".", ",") for row in rows]
     path.write_text("\n".join([head.replace('","', f'"{separator}"'), *rows]), encoding="utf-8")
     assert_right(imported(tmp_path))
+
+
+# Damage of any kind.
+
+
+def damaged(content: bytearray, random) -> bytearray:
+    """Content that was cut, or lost, gained or changed some bytes or lines."""
+    at, lines = random.randrange(len(content)), content.split(b"\n")
+    line = random.randrange(len(lines))
+    match random.randrange(5):
+        case 0:
+            return content[:at]
+        case 1:
+            return content[:at] + bytes([random.randrange(256)]) + content[at + 1 :]
+        case 2:
+            return content[:at] + content[at + random.randrange(1, 80) :]
+        case 3:
+            return bytearray(b"\n".join([*lines[:line], lines[line], *lines[line:]]))
+    return bytearray(b"\n".join([*lines[:line], *lines[line + 1 :]]))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_damaged_file_gives_an_error_of_ours_or_a_whole_run(seed, tmp_path):
+    random = Random(seed)
+    shutil.copytree(DATA, tmp_path / "data")
+    path = random.choice(sorted(item for item in (tmp_path / "data").rglob("*.*") if item.suffix in (".csv", ".dat")))
+    path.write_bytes(damaged(bytearray(path.read_bytes()), random))
+    for name in ("star", "openfoam", "sheet"):
+        try:
+            runs = import_runs(tmp_path / "data" / f"{name}.toml")
+        except InputError:
+            continue
+        assert all(np.isfinite(run.loads).all() and np.isfinite(run.history.nu).all() for run in runs)
 
 
 # Mappings.

@@ -77,14 +77,15 @@ def _without_overtaken(t: Array, back: NDArray[np.intp]) -> tuple[NDArray[np.int
 def joined(tables: Sequence[Table], time: str) -> Table:
     """One table in the order of ``time``: files with the same columns follow each other, others stand side by side.
 
+    Files follow each other by their first time; of those that start together, the one named later is the later one.
+
     Raises
     ------
     InputError
         Files without the time column, with some columns in common and others not, or of different times.
     """
     chains: list[Table] = []
-    for table in tables:
-        table.find(time)
+    for table in sorted(tables, key=lambda item: _start(item, time)):
         same = next((i for i, known in enumerate(chains) if known.names == table.names), None)
         if same is None:
             chains.append(table)
@@ -95,6 +96,11 @@ def joined(tables: Sequence[Table], time: str) -> Table:
     for other in chains[1:]:
         whole = _beside(whole, other, time)
     return whole
+
+
+def _start(table: Table, time: str) -> float:
+    values = table.values[:, table.find(time)]
+    return float(np.min(values, where=np.isfinite(values), initial=np.inf))
 
 
 def _after(first: Table, then: Table) -> Table:

@@ -122,10 +122,10 @@ def _lines(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
 def _centre(heads: Iterable[str], path: Path) -> tuple[float, float, float] | None:
     for line in heads:
         if found := _CENTRE.search(line):
-            numbers = [float(cell) for cell in found[1].split()]
-            if len(numbers) != 3:
-                raise InputError(f"{path}: CofR ({found[1]}) has {len(numbers)} numbers, wanted 3.")
-            return numbers[0], numbers[1], numbers[2]
+            numbers = found[1].split()
+            if len(numbers) != 3 or not all(_is_float(cell) for cell in numbers):
+                raise InputError(f"{path}: CofR ({found[1]}) is not three numbers. Copy the file again from the case.")
+            return float(numbers[0]), float(numbers[1]), float(numbers[2])
     return None
 
 
@@ -186,14 +186,16 @@ def _pair(force: Path, moment: Path) -> Table:
 
 def _totals(path: Path, names: tuple[str, ...]) -> Table:
     heads, rows = _lines(path)
-    header = next((line for line in heads if "total_x" in line), None)
-    if header is None:
+    wanted = [f"total_{axis}" for axis in "xyz"]
+    headers = (line.lstrip("# ").replace("(", " ").replace(")", " ").split() for line in heads)
+    columns = next((found for found in headers if set(wanted) <= set(found)), None)
+    if columns is None:
         raise InputError(
-            f"{path}: no header names total_x. Columns of this layout are known by their names only; keep the header."
+            f"{path}: no header names {', '.join(wanted)}. Columns of this layout are known by their names only; keep "
+            "the header."
         )
-    columns = header.lstrip("# ").replace("(", " ").replace(")", " ").split()
     values, lines, repairs = _numbers(path, rows, (len(columns),))
-    at = [0, *(columns.index(f"total_{axis}") for axis in "xyz")]
+    at = [0, *(columns.index(name) for name in wanted)]
     return _made(path.name, values[:, at], lines, repairs, _centre(heads, path), ("time", *names))
 
 
