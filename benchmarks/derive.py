@@ -2,7 +2,8 @@
 
 220 runs: 200 oscillations of 2000 settled samples each and 20 steady ones, from known coefficients with 2 % noise, once
 without a model-form ensemble and once with 48 members. Each case runs in a process of its own, which settles the
-samples, identifies, and prints wall time and memory. Prints a table with the goals and writes bench/derive.json;
+samples, identifies, and prints wall time, processor time (all threads) and memory; ``derive_s`` is the whole of
+``derive`` with its screening. ``load`` is that of the machine before it began. Prints a table with the goals and writes bench/derive.json;
 ``--keep`` also writes benchmarks/derive.json, which the repository keeps.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -26,7 +28,7 @@ from towtank.artefact import write_json
 from towtank.craft.library import read_craft
 from towtank.derive.cycles import settled
 from towtank.derive.derive import derive
-from towtank.derive.identify import identify
+from towtank.derive.identify import Method, identify
 from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import Drift, Heave, Pitch, Roll, Surge, Sway, Turn, Yaw
 from towtank.progress import Silent
@@ -73,14 +75,20 @@ def one(members: int) -> dict[str, float]:
     walls, whole = [], []
     for _ in range(ROUNDS if not members else 2):
         begun = time.perf_counter()
-        solved = identify(runs, settled(runs), 0.7)
+        solved = identify(runs, settled(runs), Method(0.7))
         walls.append(time.perf_counter() - begun)
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    if not members:
+    for _ in range(0 if members else 3):
         begun = time.perf_counter()
         derive(runs)
         whole.append(time.perf_counter() - begun)
-    out = {"identify_s": min(walls), "runs_MB": before, "peak_MB": after, "unknowns": float(len(solved.covariance))}
+    out = {
+        "identify_s": min(walls),
+        "identify_cpu_s": min(work),
+        "runs_MB": before,
+        "peak_MB": after,
+        "unknowns": float(len(solved.covariance)),
+    }
     return out | ({"derive_s": min(whole)} if whole else {})
 
 
@@ -92,7 +100,7 @@ def main() -> None:
     if options.one is not None:
         print(json.dumps(one(options.one)))
         return
-    where, numbers = machine(), {}
+    where, numbers = machine(), {"load": float(f"{os.getloadavg()[0]:.2g}")}
     for members in (0, MEMBERS):
         words = [sys.executable, __file__, "--one", str(members)]
         found = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)

@@ -15,9 +15,11 @@ from towtank.derive.convert import about_point
 from towtank.derive.cycles import settled
 from towtank.derive.expand import Expansion, expand
 from towtank.derive.fourier import fourier
-from towtank.derive.identify import identify
+from towtank.derive.identify import Method, identify
 from towtank.derive.mesh import mesh_covariance
 from towtank.derive.origin import Origin, origin_slopes
+from towtank.derive.regress import Covariance, block_jackknife
+from towtank.derive.robust import Loss
 from towtank.derive.screen import DRIFT_LIMIT_DEG, FIN_LIMIT_DEG, name_of, screen
 from towtank.derive.table import Derivatives, Reference
 from towtank.derive.verdicts import Judged, Verdict, judged
@@ -39,6 +41,8 @@ def derive(
     screening: bool = True,
     grid: GridStudy | None = None,
     optional: Sequence[str] = (),
+    covariance: Covariance = block_jackknife,
+    loss: Loss | None = None,
 ) -> Derivatives:
     """Derivatives of a craft from its captive runs.
 
@@ -53,6 +57,8 @@ def derive(
     screening : test every run against the fit to the others; without it, only the range of the model decides.
     grid : study of the runs' meshes, whose uncertainty enters the weights and the covariance ``mesh``.
     optional : groups of ``symbols.OPTIONAL`` to fit as well: "third-order", "Xuuvv".
+    covariance : estimator of the fit's covariance, out of ``derive.regress``.   loss : ``derive.robust.huber``, or None
+        for least squares.
 
     Returns
     -------
@@ -72,8 +78,9 @@ def derive(
     within, outside = screen(tuple(runs), mix_levels)
     share = weights.default_share(within) if weight_steady is None else float(weight_steady)
     mesh = _mesh(grid, within)
-    found = judged(within, share, mesh, optional) if screening else _unjudged(within, share, mesh, optional)
-    result = _derivatives(_Fitted(tuple(runs), outside, found, share, mesh))
+    method = Method(share, tuple(optional), covariance, loss)
+    found = judged(within, method, mesh) if screening else _unjudged(within, method, mesh)
+    result = _derivatives(_Fitted(tuple(runs), outside, found, method))
     checks = [check.document() for check in consistency(result)]
     return about_point(replace(result, quality={**result.quality, "consistency": checks}), about, length)
 
@@ -85,8 +92,7 @@ class _Fitted:
     given: tuple[Run, ...]
     outside: tuple[tuple[str, str], ...]
     judged: Judged
-    share: float
-    mesh: Array | None
+    method: Method
 
 
 def _mesh(grid: GridStudy | None, runs: Sequence[Run]) -> Array | None:
@@ -97,9 +103,9 @@ def _mesh(grid: GridStudy | None, runs: Sequence[Run]) -> Array | None:
     return mesh_uncertainty(grid, runs)
 
 
-def _unjudged(runs: tuple[Run, ...], share: float, mesh: Array | None, optional: Sequence[str]) -> Judged:
+def _unjudged(runs: tuple[Run, ...], method: Method, mesh: Array | None) -> Judged:
     samples = settled(runs)
-    return Judged(runs, samples, identify(runs, samples, share, mesh=mesh, optional=optional), {}, mesh)
+    return Judged(runs, samples, identify(runs, samples, method, mesh=mesh), {}, mesh)
 
 
 def _derivatives(it: _Fitted) -> Derivatives:
@@ -135,7 +141,7 @@ def _quality(it: _Fitted, names: Sequence[str], expansion: Expansion, origin: Or
     return {
         "symmetry": runs[0].symmetry,
         "body": {"diameter": runs[0].diameter},
-        "weight_steady": it.share,
+        "weight_steady": it.method.weight_steady,
         "range_deg": DRIFT_LIMIT_DEG,
         "fins_range_deg": FIN_LIMIT_DEG,
         "runs": len(runs),

@@ -46,45 +46,64 @@ class Solved:
     trust: Array | None = None
 
 
+@dataclass(frozen=True)
+class Method:
+    """How runs are fitted.
+
+    weight_steady : lambda, the share of steady drift against sway, 0 to 1.
+    optional : groups of ``symbols.OPTIONAL`` that are fitted as well.
+    covariance : estimator out of ``regress``.   loss : ``robust.huber`` for a first fit that bad runs do not pull, and
+        weights that fall with their residual in it; None for least squares.
+    """
+
+    weight_steady: float
+    optional: Sequence[str] = ()
+    covariance: Covariance = block_jackknife
+    loss: Loss | None = None
+
+
 def identify(
     runs: Sequence[Run],
     samples: Samples,
-    weight_steady: float,
+    method: Method,
     *,
     trust: Array | None = None,
     mesh: Array | None = None,
-    optional: Sequence[str] = (),
-    covariance: Covariance = block_jackknife,
-    loss: Loss | None = None,
 ) -> Solved:
     """Choose the terms, weigh the runs by what is left of a first unweighted fit, solve, and gate the roll terms.
 
     Parameters
     ----------
-    weight_steady : lambda.   trust (R,) : factor on the weight of each run, 0 < t <= 1; None for ones.
+    trust (R,) : factor on the weight of each run, 0 < t <= 1; None for ones.
     mesh (R, 6) : standard discretisation uncertainty of each load of each run [N, N m]; its square adds to the square
         of the residual that sets the weight. None where no grid study was made.
-    optional : groups of ``symbols.OPTIONAL`` that are fitted as well.
-    covariance : estimator out of ``regress``.   loss : ``robust.huber`` for a first fit that bad runs do not pull, and
-        weights that fall with their residual in it; None for least squares.
 
     Raises
     ------
     DeriveError
-        The runs excite nothing, ``weight_steady`` is outside 0..1, or ``trust`` is outside 0..1.
+        The runs excite nothing, an unknown group of terms, lambda or ``trust`` outside 0..1.
     """
-    choice, system = assemble(runs, samples, optional)
-    return fitted(runs, choice, system, weight_steady, trust=trust, mesh=mesh, covariance=covariance, loss=loss)
+    factor = _trust(runs, trust)
+    choice, system = _assemble(runs, samples, method.optional)
+    plain = 1.0 / (system.count[:, None] * weights.load_scale(system) ** 2)
+    lowered = np.ones_like(plain) if method.loss is None else method.loss(system, plain)
+    first = solve(system, plain * lowered)
+    spread = weights.spread(system, runs, first.unknowns[:, 0]) / np.sqrt(lowered)
+    if mesh is not None:
+        spread = np.hypot(spread, mesh)
+    share = weights.family(system, runs, method.weight_steady) * factor[:, None]
+    solved = weighted(choice, system, spread, share, method.covariance)
+    gated = _gate(solved, runs[0].symmetry)
+    out = {name: str(entry["why"]) for name, entry in gated.items() if not entry["in_model"]}
+    if out:
+        left = [i for i, name in enumerate(system.names) if name not in out]
+        choice, system = choice.keep([system.names[i] for i in left], out), system.keep(left)
+        solved = weighted(choice, system, spread, share, method.covariance)
+    return replace(solved, gated=gated, trust=factor)
 
 
-def assemble(runs: Sequence[Run], samples: Samples, optional: Sequence[str] = ()) -> tuple[Choice, System]:
-    """The terms that the runs tell apart, and their linear system; ``optional`` as in ``identify``.
-
-    Raises
-    ------
-    DeriveError
-        The runs excite nothing.
-    """
+def _assemble(runs: Sequence[Run], samples: Samples, optional: Sequence[str]) -> tuple[Choice, System]:
+    """The terms that the runs tell apart, and their linear system."""
     choice = choose(runs, samples, optional)
     if not choice.unknowns:
         raise DeriveError(
@@ -94,42 +113,6 @@ def assemble(runs: Sequence[Run], samples: Samples, optional: Sequence[str] = ()
     scale = weights.load_scale(system)
     kept, reasons = independent(system.matrix / scale[system.load][:, None], system.names)
     return choice.keep([system.names[i] for i in kept], reasons), system.keep(kept)
-
-
-def fitted(
-    runs: Sequence[Run],
-    choice: Choice,
-    system: System,
-    weight_steady: float,
-    *,
-    trust: Array | None = None,
-    mesh: Array | None = None,
-    covariance: Covariance = block_jackknife,
-    loss: Loss | None = None,
-) -> Solved:
-    """The regression of a system of ``assemble``: weights, solution, gates, covariance. Arguments as in ``identify``.
-
-    Raises
-    ------
-    DeriveError
-        ``weight_steady`` or ``trust`` is outside 0..1.
-    """
-    factor = _trust(runs, trust)
-    plain = 1.0 / (system.count[:, None] * weights.load_scale(system) ** 2)
-    lowered = np.ones_like(plain) if loss is None else loss(system, plain)
-    first = solve(system, plain * lowered)
-    spread = weights.spread(system, runs, first.unknowns[:, 0]) / np.sqrt(lowered)
-    if mesh is not None:
-        spread = np.hypot(spread, mesh)
-    share = weights.family(system, runs, weight_steady) * factor[:, None]
-    solved = weighted(choice, system, spread, share, covariance)
-    gated = _gate(solved, runs[0].symmetry)
-    out = {name: str(entry["why"]) for name, entry in gated.items() if not entry["in_model"]}
-    if out:
-        left = [i for i, name in enumerate(system.names) if name not in out]
-        choice, system = choice.keep([system.names[i] for i in left], out), system.keep(left)
-        solved = weighted(choice, system, spread, share, covariance)
-    return replace(solved, gated=gated, trust=factor)
 
 
 def _trust(runs: Sequence[Run], trust: Array | None) -> Array:

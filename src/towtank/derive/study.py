@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 from towtank.derive import measure
 from towtank.derive.cycles import Samples, family_of, settled
 from towtank.derive.fourier import DRIVEN, harmonics
-from towtank.derive.identify import identify
+from towtank.derive.identify import Method, identify
 from towtank.derive.measure import driven
 from towtank.derive.screen import name_of
 from towtank.derive.table import Derivatives
@@ -250,7 +250,7 @@ def _gains(runs: Sequence[Run], derivatives: Derivatives) -> Iterator[Gain]:
 
 def _missed(runs: Sequence[Run], samples: Samples, share: float, optional: tuple[str, ...]) -> dict[str, float]:
     """Kind -> share of the driven loads that the fit with ``optional`` terms misses."""
-    solved = identify(runs, samples, share, optional=optional)
+    solved = identify(runs, samples, Method(share, optional))
     found = measure.waves(runs, samples, solved.choice.order)
     fits = measure.misfits(runs, solved, measure.left_out(solved), found, load_scale(solved.system))
     families = [family_of(run) for run in runs]

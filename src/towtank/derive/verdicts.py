@@ -11,7 +11,7 @@ import numpy as np
 
 from towtank.derive import measure, weights
 from towtank.derive.cycles import Samples, family_of, settled
-from towtank.derive.identify import Solved, identify
+from towtank.derive.identify import Method, Solved, identify
 from towtank.derive.screen import name_of
 from towtank.frames import Array
 from towtank.tank.run import Run
@@ -132,14 +132,14 @@ class Judged:
         return tuple((name, item.why) for name, item in self.verdicts.items() if item.verdict == "rejected")
 
 
-def judged(runs: Sequence[Run], share: float, mesh: Array | None = None, optional: Sequence[str] = ()) -> Judged:
+def judged(runs: Sequence[Run], method: Method, mesh: Array | None = None) -> Judged:
     """Fit, test each run against the fit to the others, leave the worst of each kind out, and again until none is left.
 
     Then the doubtful ones are weighed down, and tested once more.
 
     Parameters
     ----------
-    share, mesh (R, 6), optional : as in ``identify.identify``.
+    mesh (R, 6) : as in ``identify.identify``.
 
     A run that alone determines a direction of the fit cannot be tested against others and is kept. One of each kind at
     a time: a violent run spoils the fit of its neighbours, which may pass once it is gone. Half of a kind at most is
@@ -156,7 +156,7 @@ def judged(runs: Sequence[Run], share: float, mesh: Array | None = None, optiona
     weighed = False
     while True:
         samples = settled(kept)
-        solved = identify(kept, samples, share, trust=trust, mesh=lattice, optional=optional)
+        solved = identify(kept, samples, method, trust=trust, mesh=lattice)
         tests = tested(kept, samples, solved)
         verdicts = [verdict_of(item) for item in tests]
         worst = _worst_of_kinds(kept, verdicts, Counter(map(family_of, runs)))
