@@ -95,7 +95,7 @@ def test_monitors_made_by_the_macro_s_numbers_come_back_as_the_runs_of_the_plan(
         run = TANK.run(HOKIE, CaptiveTest(name, motion.speed, motion, fins, periods, samples), Silent())
         time, loads = seen(run, matrix=np.eye(3))
         if not oscillating:
-            time = np.arange(1, round(end / step) + 1) * step
+            time = np.arange(1, round(end / step / 20) + 1) * 20 * step  # monitors that skip steps, to write less
             loads = np.tile(loads[:1], (len(time), 1))
         star_csv(tmp_path / "monitors" / f"{name}.csv", time, loads)
     found = import_runs(files["mapping"])
