@@ -171,6 +171,18 @@ def scaled(cell: str, factor: float) -> str:
     return f"{float(cell.replace(',', '.')) * factor:.9g}".replace(".", ",")
 
 
+def test_the_page_on_mappings_names_every_key_and_column():
+    from towtank.tank.imported.mapping import COLUMN_UNITS, MOTION_KINDS
+    from towtank.tank.imported.reading import _RUN_KEYS
+
+    page = (Path(__file__).parents[2] / "docs" / "import.md").read_text("utf-8")
+    assert [key for key in (*_RUN_KEYS, "schema", "craft", *MOTION_KINDS) if f"`{key}`" not in page] == []
+    shown = (
+        page.replace("udot` .. `rdot", " ".join(f"{rate}dot" for rate in "uvwpqr")).replace("`", " ").replace(";", " ")
+    )
+    assert [name for name in COLUMN_UNITS if f" {name} " not in shown] == []
+
+
 def test_plan_export_writes_what_import_reads_back(data):
     code, out, err = call("plan", "hokie", "--export", "star")
     assert code == 0, err
