@@ -3,8 +3,8 @@
 220 runs: 200 oscillations of 2000 settled samples each and 20 steady ones, from known coefficients with 2 % noise, once
 without a model-form ensemble and once with 48 members. Each case runs in a process of its own, which settles the
 samples, identifies, and prints wall time, processor time (all threads) and memory; ``derive_s`` is the whole of
-``derive`` with its screening. ``load`` is that of the machine before it began. Prints a table with the goals and writes bench/derive.json;
-``--keep`` also writes benchmarks/derive.json, which the repository keeps.
+``derive`` with its screening. ``load`` is that of the machine before it began. Prints a table with the goals and writes
+bench/derive.json; ``--keep`` also writes benchmarks/derive.json, which the repository keeps.
 """
 
 from __future__ import annotations
@@ -72,11 +72,12 @@ def one(members: int) -> dict[str, float]:
         factors = 1.0 + 0.1 * rng.standard_normal(members)
         runs = [replace(run, ensemble=run.loads * factors[:, None, None]) for run in runs]
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    walls, whole = [], []
+    walls, work, whole = [], [], []
     for _ in range(ROUNDS if not members else 2):
-        begun = time.perf_counter()
+        begun, busy = time.perf_counter(), time.process_time()
         solved = identify(runs, settled(runs), Method(0.7))
         walls.append(time.perf_counter() - begun)
+        work.append(time.process_time() - busy)
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     for _ in range(0 if members else 3):
         begun = time.perf_counter()

@@ -30,8 +30,12 @@ def harmonics(values: Array, count: int, cycles: int) -> Array:
 
     Source     THEORY section 4: F_c = (2 / nT) int F cos wt, F_s likewise; here F_c - i F_s.
     """
-    spectrum = np.fft.rfft(values, axis=0) / len(values)
-    orders = spectrum[np.arange(count + 1) * cycles]
+    size = len(values)
+    # Whole turns taken out of the angle before it is one, so that long records lose no digits. A few sums, not a
+    # transform: only the first of hundreds of harmonics are wanted.
+    angle = 2.0 * np.pi / size * (np.outer(np.arange(count + 1) * cycles, np.arange(size)) % size)
+    flat = values.reshape(size, -1)
+    orders = (np.cos(angle) @ flat - 1j * (np.sin(angle) @ flat)).reshape(count + 1, *values.shape[1:]) / size
     return np.asarray(np.concatenate([orders[:1], 2.0 * orders[1:]]))
 
 
