@@ -16,6 +16,7 @@ from towtank.craft.library import read_craft
 from towtank.derive.convert import about_point
 from towtank.derive.derive import derive
 from towtank.derive.files import read_derivatives, write_derivatives
+from towtank.derive.robust import huber
 from towtank.derive.select import GATED, allowed
 from towtank.plan.history import History
 from towtank.plan.kinds import CaptiveTest
@@ -183,6 +184,20 @@ def test_a_violent_run_is_found_and_named_and_does_not_move_the_answer(symmetry)
         assert abs(found[term] - values[term]) < 4.0 * std
     assert name not in {run for rests in found.runs.values() for run in rests}
     assert name in {run for rests in blind.runs.values() for run in rests}
+
+
+def test_a_robust_loss_lowers_the_weight_of_a_violent_run_that_is_not_screened():
+    """Runs that a different law made: their residual in the robust fit is theirs alone, not shared by their kind."""
+    craft = craft_of("fourfold")
+    values = known_set(craft, seed=0)
+    runs = tow(plan_of(craft), LpmTank(values, noise=0.02, seed=5))
+    planted = [replace(run, loads=1.5 * run.loads) if run.name == "drift-p18" else run for run in runs]
+    plain = derive(planted, screening=False)
+    robust = derive(planted, screening=False, loss=huber)
+    std = dict(zip(robust.names, np.sqrt(np.diag(robust.covariance)), strict=True))
+    for term in ("Yvv", "Nvv"):
+        assert abs(robust[term] - values[term]) < 0.5 * abs(plain[term] - values[term]), term
+        assert abs(robust[term] - values[term]) < 4.0 * std[term], term
 
 
 def test_a_run_beyond_the_range_is_named_too():

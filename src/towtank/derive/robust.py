@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.derive.regress import solve
 from towtank.derive.system import System
@@ -18,14 +20,17 @@ TUNING = 1.345
 """Residual, in standard deviations, up to which the loss is quadratic: 95 % efficient on normal errors (huber1964)."""
 
 _NORMAL = 0.6744897501960817  # median of the absolute value of a standard normal variable
-_ROUNDS, _CLOSE = 50, 1e-8
+_ROUNDS, _CLOSE = 100, 1e-8
+_NO_LOAD = 1e-6  # share of the largest load of its kind below which a run has none: round-off, as in quality.residuals
+_BELIEVED = 1e-3  # smallest scale, as a share of the load's rms over the runs that hold it: exact data stay exact
 
 
 def huber(system: System, weight: Array) -> Array:
     """Factor (R, 6), 0 to 1, by which Huber's loss lowers the weight of each load of each run.
 
     The unit is a load of a run, not a sample: its residual is the root mean square over the run, in units of the
-    weight. The scale of each load is the median of these over the runs that hold it, taken as that of normal errors.
+    weight. The scale of each load is the median of these over the runs that hold it, taken as that of normal errors,
+    and at least a thousandth of the load.
 
     weight (R, 6) : of a sample of each load of each run, before the factor.
 
@@ -38,14 +43,12 @@ def huber(system: System, weight: Array) -> Array:
                statsmodels' RLM, with which a test agrees.
     Valid      Fewer than half of the runs are wrong, and none of them alone determines a term.
     """
-    factor = np.ones_like(weight)
-    share = weight * system.count[:, None]
-    held = np.zeros(weight.shape, dtype=bool)
-    held[system.run, system.load] = True
+    nominal, factor = replace(system, rhs=system.rhs[:, :1]), np.ones_like(weight)
+    loads = np.sqrt(weight * system.power)
+    held = loads > _NO_LOAD * loads.max(axis=0)
     for _ in range(_ROUNDS):
-        unknowns = solve(system, weight * factor).unknowns[:, 0]
-        size = np.sqrt(share * system.squares(unknowns) / system.count[:, None])
-        former, factor = factor, _factor(size, held)
+        size = np.sqrt(weight * system.squares(solve(nominal, weight * factor).unknowns[:, 0]))
+        former, factor = factor, _factor(size, loads, held)
         if np.abs(factor - former).max() < _CLOSE:
             return factor
     raise DeriveError(
@@ -54,12 +57,13 @@ def huber(system: System, weight: Array) -> Array:
     )
 
 
-def _factor(size: Array, held: Array) -> Array:
-    """Huber's weights of the residuals ``size`` (R, 6), load by load."""
+def _factor(size: Array, loads: Array, held: NDArray[np.bool_]) -> Array:
+    """Huber's weights of the residuals ``size`` (R, 6), load by load; ``held`` (R, 6) where a run has the load."""
     factor = np.ones_like(size)
     for load in range(size.shape[1]):
         at = held[:, load]
-        scale = float(np.median(size[at, load])) / _NORMAL if at.any() else 0.0
-        if scale > 0.0:
-            factor[at, load] = np.minimum(1.0, TUNING * scale / np.maximum(size[at, load], 1e-300))
+        if at.any():
+            least = _BELIEVED * np.sqrt((loads[at, load] ** 2).mean())
+            scale = max(float(np.median(size[at, load])) / _NORMAL, least)
+            factor[at, load] = np.minimum(1.0, TUNING * scale / np.maximum(size[at, load], least))
     return factor
