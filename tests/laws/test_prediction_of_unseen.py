@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from prediction import OSCILLATIONS, PAIRS, THIRD, Free, free_test, missed, unseen
+from prediction import OSCILLATIONS, PAIRS, TARGET, THIRD, Free, free_test, missed, unseen
+from tables import read_table
 from towtank.craft.library import read_craft
 from towtank.derive.derive import derive
 from towtank.plan.motion import sampled
@@ -63,3 +64,22 @@ def test_free_motions_are_smooth_periodic_and_their_accelerations_are_those_of_t
     np.testing.assert_allclose(slope, history.nudot[2:-2], atol=1e-5 * np.abs(history.nudot).max())
     before = test.motion.history(history.time - test.motion.period)
     np.testing.assert_allclose(before.nu, nu, atol=1e-9)
+
+
+@pytest.mark.validate
+def test_long_table_shows_where_twice_is_reached_and_where_not():
+    """``validation/prediction.py`` has just written it: two craft, three planes, three paces, 12 motions each."""
+    rows = read_table(TARGET)
+    cases = sorted({(row["craft"], row["plane"], row["knots"]) for row in rows})
+    assert len(cases) == 18
+    for case in cases:
+        mine = [row for row in rows if (row["craft"], row["plane"], row["knots"]) == case]
+
+        def least(practice, load, mine=mine):
+            return min(float(row[load]) for row in mine if row["practice"] == practice and row[load])
+
+        # All loads together: everywhere. Load by load: in one plane at the pace of a turn, 4 lengths from knot to knot.
+        slow = case[2] == "4" and case[1] != "all six"
+        for load in ("all", *({"horizontal": "XYN", "vertical": "XZM"}[case[1]] if slow else "")):
+            ours, best = least("many frequencies, third order", load), least("one pair and drift", load)
+            assert 2.0 * ours < best, (case, load)
