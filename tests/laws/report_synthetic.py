@@ -9,6 +9,7 @@ import numpy as np
 
 from towtank.craft.craft import Craft
 from towtank.craft.library import read_craft
+from towtank.derive.study import Advice, FrequencyStudy, Gain, Loop, Point, Trend
 from towtank.derive.table import Derivatives, Reference
 from towtank.plan.kinds import CaptiveTest, Plan
 from towtank.plan.motion import Drift, Sway, Yaw
@@ -79,6 +80,33 @@ def runs() -> tuple[Run, ...]:
         )
         for run in found
     )
+
+
+TREND = {"limit": -200.0, "bend": 5.0, "growth": -900.0}
+"""Yuv of ``frequency``: limit + bend w'2 + growth a'."""
+
+
+@cache
+def frequency() -> FrequencyStudy:
+    """Six sways that follow ``TREND``, but for a rejected one 50 % off it, beside one yaw."""
+    points = [
+        Point(f"sway-{a}-{w}", "sway", "Yuv", w, a, TREND["limit"] + TREND["bend"] * w**2 + TREND["growth"] * a, 2.0,
+              "accepted")
+        for a in (0.1, 0.2) for w in (1.0, 2.0, 3.0)
+    ]  # fmt: skip
+    points[1] = replace(points[1], verdict="down-weighted")
+    points[-1] = replace(points[-1], value=1.5 * points[-1].value, verdict="rejected")
+    points.append(Point("yaw-1", "yaw", "Nur", 1.5, 0.3, -8000.0, float("nan"), "accepted"))
+    nan = float("nan")
+    trends = (
+        Trend("sway", "Yuv", TREND["limit"], 8.0, -220.0, -180.0, TREND["bend"], TREND["growth"], 5, -210.0),
+        Trend("yaw", "Nur", -8000.0, nan, nan, nan, nan, nan, 1, -7700.0),
+    )
+    return FrequencyStudy(
+        "hokie", "known coefficients", tuple(points), trends, (Loop("yaw-1", "N", 5.0, 4.5, 0.08),),
+        (Advice("sway", (0.8, 1.3, 2.0), (0.08, 0.2), "no load moves by 5 %"),),
+        (Gain("third-order", "turn, mixed", 0.19, 0.02), Gain("third-order", "drift", 0.011, 0.010)), {},
+    )  # fmt: skip
 
 
 def stalled() -> tuple[Run, ...]:

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import synthetic_craft as synthetic
-from towtank.figures import coefficients, forces, histories, paper, poles, series, shape, tracks
+from towtank.figures import coefficients, forces, frequency, histories, paper, poles, series, shape, tracks
 from towtank.trials.circle import turning_circle
 from towtank.trials.zigzag import zigzag
 
@@ -45,6 +45,9 @@ FIGURES = {
     "hysteresis": lambda: series.hysteresis(_run("sway-2"), "vdot", "Y", case.derivatives()),
     "ensemble": lambda: series.ensemble(_run("yaw-1")),
     "residual per run": lambda: series.residual_per_run(case.runs(), case.derivatives()),
+    "frequency": lambda: frequency.against_frequency(case.frequency(), "Yuv"),
+    "amplitude": lambda: frequency.against_amplitude(case.frequency(), "Yuv"),
+    "one oscillation": lambda: frequency.against_frequency(case.frequency(), "Nur"),
     "bars": lambda: coefficients.derivative_bars(case.derivatives()),
     "uncertainty": lambda: coefficients.uncertainty_shares(case.derivatives()),
     "plan view": lambda: tracks.plan_view(case.trials()),
@@ -83,10 +86,10 @@ def test_the_semi_empirical_level_is_spelled_out():
 def test_every_public_figure_takes_axes_and_gives_them_back():
     own = Figure().add_subplot()
     assert forces.load_against_angle(case.runs(), ax=own) is own
-    for module in (forces, series, coefficients, tracks, histories, poles, shape):
+    for module in (forces, series, frequency, coefficients, tracks, histories, poles, shape):
         for name, function in inspect.getmembers(module, inspect.isfunction):
             public = function.__module__ == module.__name__ and not name.startswith("_")
-            if public and name not in ("sweep", "residuals"):
+            if public and name not in ("sweep", "residuals", "levels"):
                 assert inspect.signature(function).parameters["ax"].default is None, name
 
 
@@ -99,6 +102,89 @@ def test_points_are_the_loads_and_the_fit_passes_through_them():
     assert points.get_ydata() == approx(data.load)
     left = forces.residual_against_angle(case.runs(), case.derivatives(), "Y").lines[0].get_ydata()
     assert np.abs(left).max() < 1e-9 * np.abs(data.load).max()
+
+
+def _judged(**verdicts):
+    quality = {"screening": {name.replace("_", "-"): {"verdict": found} for name, found in verdicts.items()}}
+    return replace(case.derivatives(), quality=quality)
+
+
+def test_a_run_is_marked_by_its_verdict_in_force_and_residual():
+    it = _judged(drift_16="rejected", drift_8="down-weighted", drift_4="exploratory")
+    for ax in (
+        forces.load_against_angle(case.runs(), "Y", "drift", it),
+        forces.residual_against_angle(case.runs(), it),
+    ):
+        marked = {line.get_marker(): line for line in ax.lines if line.get_marker() not in ("None", "|", "_", "")}
+        assert marked["X"].get_xdata() == approx([16.0])
+        assert marked["P"].get_xdata() == approx([4.0])
+        assert {marked["X"].get_fillstyle(), marked["P"].get_fillstyle()} == {"none"}
+        round_ones = [line for line in ax.lines if line.get_marker() == "o"]
+        assert {line.get_fillstyle(): len(line.get_xdata()) for line in round_ones} == {"full": 4, "none": 1}
+        names = [text for text in ax.get_legend_handles_labels()[1] if text in paper.MARKS]
+        assert names == ["down-weighted", "rejected", "exploratory"]
+
+
+def test_a_run_is_known_by_its_identity_where_names_repeat():
+    run = _run("drift-8")
+    it = replace(case.derivatives(), quality={"screening": {run.id: {"verdict": "rejected"}}})
+    assert paper.verdicts_of([run, _run("drift-4")], it) == ["rejected", "accepted"]
+
+
+def test_loops_of_a_rejected_run_say_so():
+    ax = series.hysteresis(_run("sway-1"), "v", "Y", _judged(sway_1="rejected"))
+    assert "(rejected)" in ax.get_title(loc="left")
+
+
+def test_trends_pass_through_the_runs_and_end_in_the_limit():
+    # The points are made of the trend; lines are drawn from its numbers, so they meet to round-off.
+    it = case.frequency()
+    for ax, x, level in (
+        (frequency.against_frequency(it, "Yuv"), lambda p: p.frequency**2, lambda p: p.amplitude),
+        (frequency.against_amplitude(it, "Yuv"), lambda p: p.amplitude, lambda p: p.frequency),
+    ):
+        slopes = [line for line in ax.lines if line.get_linestyle() == "-" and len(line.get_xdata()) == 2]
+        fitted = [p for p in it.points if p.term == "Yuv" and p.verdict != "rejected"]
+        assert len(slopes) == len({level(p) for p in fitted})
+        for p in fitted:
+            assert any(np.interp(x(p), *line.get_data()) == approx(p.value) for line in slopes)
+        limit = next(line for line in ax.lines if line.get_marker() == "D")
+        assert (limit.get_xdata(), limit.get_ydata()) == (approx([0.0]), approx([-200.0]))
+        bars = next(bar for bar in ax.containers if bar.get_label() == "limit").lines[2][0].get_segments()
+        assert sorted(bars[0][:, 1]) == approx([-220.0, -180.0])
+        wide = next(line for line in ax.lines if line.get_label() == "wide fit")
+        assert set(wide.get_ydata()) == {-210.0}
+
+
+def test_rejected_and_doubtful_oscillations_are_open_and_lie_where_they_were_measured():
+    ax = frequency.against_frequency(case.frequency(), "Yuv")
+    cross = next(line for line in ax.lines if line.get_marker() == "X")
+    rejected = next(p for p in case.frequency().points if p.verdict == "rejected")
+    assert cross.get_fillstyle() == "none"
+    assert (cross.get_xdata(), cross.get_ydata()) == (approx([9.0]), approx([rejected.value]))
+    hollow = [line for line in ax.lines if line.get_marker() == "o" and line.get_fillstyle() == "none"]
+    assert [list(line.get_xdata()) for line in hollow] == [[4.0]]
+
+
+def test_one_oscillation_draws_no_trend_and_claims_no_limit():
+    ax = frequency.against_frequency(case.frequency(), "Nur")
+    assert not any(line.get_marker() == "D" for line in ax.lines)
+    assert "no uncertainty of a limit" in words(ax)
+
+
+def test_nearly_equal_amplitudes_are_one_level():
+    centre, group = frequency.levels(np.array([0.429, 0.2, 0.443, 0.199, 0.447]))
+    assert list(group) == [1, 0, 1, 0, 1]
+    assert centre == approx([0.1995, 0.4397], abs=1e-4)
+
+
+def test_a_term_that_no_oscillation_gives_is_refused_with_those_there_are():
+    with pytest.raises(ValueError, match="no oscillation gives 'Yuudr'; the study has Yuv, Nur"):
+        frequency.against_amplitude(case.frequency(), "Yuudr")
+
+
+def test_the_budget_names_what_is_not_stated():
+    assert "none stated for mesh" in words(coefficients.uncertainty_shares(case.derivatives()))
 
 
 def test_error_bars_are_two_std_of_the_ensemble():

@@ -83,7 +83,7 @@ class Page(HTMLParser):
 def whole() -> str:
     everything = Study(
         craft=replace(case.craft(), title="Hokie of this test"), plan=case.plan(), runs=case.runs(),
-        derivatives=case.derivatives(), trajectories=case.trials(), verdict=VERDICT,
+        derivatives=case.derivatives(), frequency=case.frequency(), trajectories=case.trials(), verdict=VERDICT,
         index={"trials": [{"name": "turning-15deg", "indices": {"advance": {"value": 19.1, "std": 1.3, "unit": "m"}}}]},
         validation={"rows": [
             {"quantity": "Y'v of a tested hull", "predicted": -0.0062, "measured": -0.0059, "error_percent": 5.1,
@@ -100,8 +100,8 @@ def parsed(whole) -> Page:
 def test_every_tag_is_closed_and_every_section_is_there_in_order(parsed):
     assert parsed.stack == []
     assert parsed.sections == [
-        "summary", "craft", "tests", "grid", "forces", "model", "trials", "mc", "verdict", "validation", "sensitivity",
-        "limits", "constants", "provenance", "runs",
+        "summary", "craft", "tests", "grid", "forces", "model", "fit", "trials", "mc", "verdict", "validation",
+        "sensitivity", "limits", "constants", "provenance", "runs",
     ]  # fmt: skip
     assert len(parsed.sections) == len(SECTIONS)
 

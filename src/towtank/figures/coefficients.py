@@ -74,11 +74,15 @@ def derivative_bars(
     frame(ax, "primed value x 1000", "", zero=False)
     ax.set_yticklabels([f"{name}'" for name in names], fontsize="x-small", parse_math=False)
     ax.invert_yaxis()
-    missing = [source for source, bar in std.items() if not bar.any()]
-    words = "2-std intervals apart" + (f"; none stated for {', '.join(missing)}" if missing else "")
-    head(ax, title, derivatives.level, words)
+    head(ax, title, derivatives.level, "2-std intervals apart" + _unstated(std))
     legend(ax)
     return ax
+
+
+def _unstated(std: dict[str, Array]) -> str:
+    """Names of the sources that are not stated, as the end of a statement on uncertainty."""
+    missing = [source for source, bar in std.items() if not bar.any()]
+    return f"; none stated for {', '.join(missing)}" if missing else ""
 
 
 def uncertainty_shares(derivatives: Derivatives, names: Sequence[str] = (), ax: Axes | None = None) -> Axes:
@@ -99,6 +103,7 @@ def uncertainty_shares(derivatives: Derivatives, names: Sequence[str] = (), ax: 
     ax.set_xticklabels(names, rotation=90, fontsize=5.6, parse_math=False)
     top = float(np.percentile(percent, 90.0)) if len(names) else 1.0
     ax.set_ylim(0.0, 1.2 * max(min(float(percent.max(initial=1.0)), 2.5 * top), 1.0))
-    head(ax, "What the uncertainty is made of", derivatives.level, "1 std, split by variance; taller bars are cut")
+    words = "1 std, split by variance; taller bars are cut" + _unstated(std)
+    head(ax, "What the uncertainty is made of", derivatives.level, words)
     legend(ax)
     return ax

@@ -25,8 +25,10 @@ from towtank.figures.paper import (
     modelled_at,
     new_axes,
     one_level,
+    points,
     spread,
     spread_words,
+    verdicts_of,
 )  # fmt: skip
 from towtank.frames import Array, drift_angle, incidence_angle
 from towtank.symbols import LOADS
@@ -114,7 +116,10 @@ def load_against_angle(
     derivatives: Derivatives | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Load [N, N m] against drift or incidence [deg]: runs, wide fit with its 2-std band, slope at the origin."""
+    """Load [N, N m] against drift or incidence [deg]: runs, wide fit with its 2-std band, slope at the origin.
+
+    Runs are marked by verdict, see ``paper.MARKS``.
+    """
     ax = new_axes(ax)
     data = sweep(runs, load, kind)
     if not data.runs:
@@ -137,10 +142,7 @@ def load_against_angle(
             ax.plot(
                 np.degrees(angle)[inner], tangent[inner], "--", color=ORIGIN, linewidth=1.2, label="slope at the origin"
             )
-    ax.errorbar(
-        degrees, data.load, yerr=None if data.std is None else 2.0 * data.std, fmt="o", markersize=3.2, color=INK,
-        ecolor=GREY, elinewidth=0.7, capsize=1.5, label="runs",
-    )  # fmt: skip
+    points(ax, degrees, data.load, data.std, verdicts_of(data.runs, derivatives))
     frame(ax, f"{WORDS[kind]} [deg]", load_label(load))
     head(ax, f"{load} against {WORDS[kind]}", one_level([run.level for run in data.runs]), spread_words(data.runs))
     legend(ax)
@@ -150,7 +152,10 @@ def load_against_angle(
 def residual_against_angle(
     runs: Sequence[Run], derivatives: Derivatives, load: str = "Y", kind: str = "drift", ax: Axes | None = None
 ) -> Axes:
-    """Measured minus fitted load [N, N m] against drift or incidence [deg], with the fit's own 2-std band."""
+    """Measured minus fitted load [N, N m] against drift or incidence [deg], with the fit's own 2-std band.
+
+    Runs are marked by verdict, see ``paper.MARKS``.
+    """
     ax = new_axes(ax, height=2.2)
     data = sweep(runs, load, kind)
     if not data.runs:
@@ -159,9 +164,9 @@ def residual_against_angle(
     mean, std = modelled_at(derivatives, data.nu, np.zeros_like(data.nu), control, data.runs[0].origin_from_nose)
     bar = 2.0 * std[:, LOADS.index(load)]
     ax.fill_between(np.degrees(data.angle), -bar, bar, color=BAND, alpha=0.45, linewidth=0, label="fit, 2 std")
-    ax.plot(
-        np.degrees(data.angle), data.load - mean[:, LOADS.index(load)], "o-", color=INK, markersize=3, linewidth=0.8
-    )
+    degrees, left = np.degrees(data.angle), data.load - mean[:, LOADS.index(load)]
+    ax.plot(degrees, left, color=INK, linewidth=0.6)
+    points(ax, degrees, left, None, verdicts_of(data.runs, derivatives))
     frame(ax, f"{WORDS[kind]} [deg]", f"run - fit [{UNITS[load]}]")
     head(
         ax,

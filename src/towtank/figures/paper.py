@@ -31,6 +31,15 @@ LEVELS = {
 UNITS = dict(zip(LOADS, ("N", "N", "N", "N m", "N m", "N m"), strict=True))
 
 
+MARKS = {
+    "accepted": ("o", "full", INK),
+    "down-weighted": ("o", "none", ORIGIN),
+    "rejected": ("X", "none", BAD),
+    "exploratory": ("P", "none", GREY),
+}
+"""Marker, filling and colour of a run by its verdict: open when not fully trusted, a cross when not fitted."""
+
+
 def level_words(level: str) -> str:
     """The level of evidence as it is printed on every figure and table."""
     return LEVELS.get(level, level)
@@ -106,6 +115,38 @@ def legend(ax: Axes, **options: Any) -> None:
 def load_label(load: str) -> str:
     """Axis label of a load, with its unit."""
     return f"{load} [{UNITS[load]}]"
+
+
+def verdicts_of(runs: Sequence[Run], derivatives: Derivatives | None) -> list[str]:
+    """Verdict of each run as the screening of ``derivatives`` left it; accepted where nobody judged."""
+    found = derivatives.quality.get("screening", {}) if derivatives else {}
+    out = {name for name, _ in derivatives.rejected} if derivatives else set()
+    verdicts = []
+    for run in runs:
+        entry = found.get(run.id, found.get(run.name))
+        left = "exploratory" if run.exploratory else "rejected" if {run.id, run.name} & out else "accepted"
+        verdicts.append(str(entry["verdict"]) if entry else left)
+    return verdicts
+
+
+def points(
+    ax: Axes, x: Array, y: Array, std: Array | None, verdicts: Sequence[str], label: str = "runs", colour: str = ""
+) -> None:
+    """Points (n,) with bars of 2 ``std``, each marked by its verdict; every verdict has a line in the legend.
+
+    colour : of the accepted and down-weighted ones, in place of that of ``MARKS``.
+    """
+    named = ax.get_legend_handles_labels()[1]
+    for verdict, (marker, filling, own) in MARKS.items():
+        words = label if verdict == "accepted" else verdict
+        at = [i for i, found in enumerate(verdicts) if found == verdict]
+        if at:
+            ax.errorbar(
+                x[at], y[at], yerr=None if std is None else 2.0 * std[at], fmt=marker, fillstyle=filling,
+                markersize=3.2 if marker == "o" else 5.0, color=colour if colour and marker == "o" else own,
+                markeredgewidth=0.8, ecolor=GREY, elinewidth=0.7, capsize=1.5,
+                label=None if words in named else words,
+            )  # fmt: skip
 
 
 def one_level(levels: Sequence[str]) -> str:

@@ -23,6 +23,7 @@ from towtank.figures.paper import (
     new_axes,
     note,
     one_level,
+    verdicts_of,
 )  # fmt: skip
 from towtank.frames import Array
 from towtank.symbols import LOADS, RATES
@@ -73,6 +74,7 @@ def hysteresis(
     """Load [N, N m] against a rate or an acceleration over the settled cycles, measured and modelled.
 
     ``against``: one of u v w p q r, or the same with "dot". ``load`` defaults to the one the test is about.
+    The title names the verdict of a run that is not plainly accepted.
     """
     load = load or MAIN.get(run.kind, "Y")
     column, used = LOADS.index(load), run.settled
@@ -90,7 +92,9 @@ def hysteresis(
     frame(ax, f"{against} [{unit}]", load_label(load))
     ax.axvline(0.0, color="#aab3ba", linewidth=0.6, zorder=1)
     words = "no uncertainty stated" if run.ensemble is None else "grey: model-form members"
-    head(ax, f"{load} against {against}, {run.name}", run.level, words)
+    verdict = verdicts_of([run], derivatives)[0]
+    title = f"{load} against {against}, {run.name}" + ("" if verdict == "accepted" else f" ({verdict})")
+    head(ax, title, run.level, words)
     legend(ax)
     return ax
 
@@ -128,9 +132,9 @@ def residual_per_run(runs: Sequence[Run], derivatives: Derivatives, ax: Axes | N
     for column, load in enumerate(LOADS):
         if np.isfinite(rms[:, column]).any():
             ax.plot(rms[:, column], "o", markersize=2.8, color=PALETTE[column], label=load)
-    rejected = {name for name, _ in derivatives.rejected}
-    for i, run in enumerate(runs):
-        if run.name in rejected or run.exploratory:
+    left = [verdict in ("rejected", "exploratory") for verdict in verdicts_of(runs, derivatives)]
+    for i, out in enumerate(left):
+        if out:
             ax.axvspan(i - 0.5, i + 0.5, color="#f3dcd3", linewidth=0)
     worst = np.nan_to_num(rms).max(axis=1)
     for i in np.argsort(worst)[-3:]:
@@ -143,7 +147,7 @@ def residual_per_run(runs: Sequence[Run], derivatives: Derivatives, ax: Axes | N
     frame(ax, "", "run - fit, rms [% of largest]", zero=False)
     ax.set_xticklabels([kinds[start] for start in starts], rotation=90, fontsize="x-small", parse_math=False)
     ax.set_ylim(bottom=0.0)
-    shade = "; tinted: not fitted" if rejected or any(run.exploratory for run in runs) else ""
+    shade = "; tinted: not fitted" if any(left) else ""
     level = one_level([run.level for run in runs])
     head(ax, "Residual of every run", level, "the points are misfit, not uncertainty" + shade)
     legend(ax, ncol=6)

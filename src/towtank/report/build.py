@@ -14,7 +14,7 @@ from towtank.artefact import write_text
 from towtank.figures.paper import level_words
 from towtank.parallel import each
 from towtank.provenance import VERSION
-from towtank.report import of_craft, of_grid, of_model, of_montecarlo, of_tests, of_trials, of_trust, of_verdict
+from towtank.report import of_craft, of_fit, of_grid, of_model, of_montecarlo, of_tests, of_trials, of_trust, of_verdict
 from towtank.report.blocks import Section, View
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import Study, gather, read_study
@@ -26,6 +26,7 @@ SECTIONS: tuple[Callable[[Study, Sketchbook], Section], ...] = (
     of_grid.mesh,
     of_tests.forces_section,
     of_model.model,
+    of_fit.fit,
     of_trials.trials,
     of_montecarlo.uncertainty,
     of_verdict.verdict,
@@ -38,7 +39,7 @@ SECTIONS: tuple[Callable[[Study, Sketchbook], Section], ...] = (
 )
 """In the order of ITTC 7.5-02-06-02 and 7.5-02-06-03, with the summary before and the run list after."""
 
-MOST_DRAWN = (of_tests.forces_section, of_trials.trials, of_craft.craft)
+MOST_DRAWN = (of_tests.forces_section, of_fit.fit, of_trials.trials, of_craft.craft)
 """Sections worth starting first when several processes share the work."""
 
 
@@ -48,8 +49,8 @@ def report(path: str | Path, *things: Any, title: str = "") -> Path:
     Parameters
     ----------
     path : file to be written.
-    things : Craft, Plan, Run, GridStudy, Derivatives, Model, Trajectory, MonteCarlo, Verdict, or sequences of them, in
-        any order. A stage that is not given is named in the page.
+    things : Craft, Plan, Run, GridStudy, Derivatives, FrequencyStudy, Model, Trajectory, MonteCarlo, Verdict, or
+        sequences of them, in any order. A stage that is not given is named in the page.
     title : of the page; the craft's own when left out.
 
     Returns

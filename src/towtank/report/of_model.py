@@ -9,7 +9,7 @@ import numpy as np
 
 from towtank.derive.table import Derivatives
 from towtank.figures import coefficients
-from towtank.report.blocks import Block, Section, Table, Text, missing, number, percent, stated, with_std
+from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated, with_std
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import STAGES, Study
 from towtank.symbols import LOADS, TERMS
@@ -37,22 +37,11 @@ def model(study: Study, book: Sketchbook) -> Section:
         _reference(it),
         _table(it),
     ]
-    if it.origin:
-        blocks.append(_origins(it))
     names = [(title, [n for n in group if n in it.names]) for title, group in coefficients.GROUPS.items()]
     for words, group in names:
         if group:
             caption = f"Primed derivatives, {words}. Intervals of two standard uncertainties, fit and model form apart."
             blocks.append(book.draw(coefficients.derivative_bars, it, group, words.capitalize(), caption=caption))
-    blocks.append(
-        book.draw(
-            coefficients.uncertainty_shares,
-            it,
-            caption="Standard uncertainty of every term and its sources.",
-        )
-    )
-    if it.rejected:
-        blocks.append(_rejected(it))
     blocks += _quality(study, it)
     return Section("model", title, tuple(blocks))
 
@@ -74,7 +63,6 @@ def _reference(it: Derivatives) -> Table:
 
 
 def _table(it: Derivatives) -> Table:
-    parts = [np.sqrt(np.maximum(np.diag(c), 0.0)) for c in (it.covariance_fit, it.covariance_mesh, it.covariance_model)]
     total = np.sqrt(np.maximum(np.diag(it.covariance), 0.0))
     order = sorted(range(len(it.names)), key=lambda i: LOADS.index(TERMS[it.names[i]].load))
     rows = []
@@ -85,50 +73,11 @@ def _table(it: Derivatives) -> Table:
         mean, std = with_std(value, float(total[i]))
         mean_p, std_p = with_std(value / unit, float(total[i]) / unit)
         rows.append((
-            name, term.meaning, mean, std, term.unit, mean_p, std_p,
-            *(percent(float(part[i]), value) if part.any() else "-" for part in parts), str(len(it.runs.get(name, ()))),
+            name, term.meaning, mean, std, term.unit, mean_p, std_p, str(len(it.runs.get(name, ()))),
         ))  # fmt: skip
-    head = (
-        "Term",
-        "Meaning",
-        "Value",
-        "std",
-        "Unit",
-        "Prime x 1000",
-        "std",
-        "fit [%]",
-        "mesh [%]",
-        "model [%]",
-        "Runs",
-    )
-    words = (
-        "std is one standard uncertainty, all sources; fit, mesh, model form in per cent of the value; - is not stated"
-    )
+    head = ("Term", "Meaning", "Value", "std", "Unit", "Prime x 1000", "std", "Runs")
+    words = "std is one standard uncertainty, all sources; the section after this one takes it apart"
     return Table("Derivatives", head, tuple(rows), stated(it.level, words))
-
-
-def _origins(it: Derivatives) -> Table:
-    rows = []
-    for name, slope in it.origin.items():
-        mean, std = with_std(float(slope), it.origin_std.get(name))
-        wide = it[name]
-        change = "-" if wide == 0.0 else f"{100.0 * (slope / wide - 1.0):+.1f}"
-        rows.append((name, number(wide), mean, std, TERMS[name].unit, change))
-    head = ("Term", "Wide fit", "Slope at the origin", "std", "Unit", "Difference [%]")
-    more = "The model and the turns use the wide fit; the stability indices use the slope at the origin as well"
-    return Table(
-        "Wide fit against slope at the origin", head, tuple(rows), stated(it.level, "std of the slope", more=more)
-    )
-
-
-def _rejected(it: Derivatives) -> Table:
-    reasons: dict[str, list[str]] = {}
-    for name, why in it.rejected:
-        reasons.setdefault(why, []).append(name)
-    rows = tuple((str(len(names)), ", ".join(names), why) for why, names in reasons.items())
-    return Table(
-        "Runs that were not fitted", ("Number", "Runs", "Reason"), rows, stated(it.level, "not applicable", axes=False)
-    )
 
 
 def _quality(study: Study, it: Derivatives) -> list[Block]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +27,7 @@ HARMONIC = {"sway", "yaw", "heave", "pitch"}
 
 
 def sensitivity(study: Study, book: Sketchbook) -> Section:
-    """Which uncertainties dominate, what lambda changes, where one symmetric half differs from the other."""
+    """Which uncertainties dominate."""
     it = study.derivatives
     if it is None:
         return Section("sensitivity", "Sensitivity", (missing("There are no derivatives.", STAGES["derivatives"]),))
@@ -41,9 +39,6 @@ def sensitivity(study: Study, book: Sketchbook) -> Section:
     blocks: list[Block] = [
         Table("Terms known least", ("Term", "Meaning", "std [%]", "Main source"), rows, stated(it.level, words)),
     ]
-    found = it.quality.get("sensitivity")
-    if isinstance(found, Mapping) and found:
-        blocks.append(_lambda(found, it.level))
     return Section("sensitivity", "Sensitivity", tuple(blocks))
 
 
@@ -57,16 +52,6 @@ def _main_source(study: Study, name: str) -> str:
         "model form": it.covariance_model[i, i],
     }
     return max(sources, key=lambda key: float(sources[key])) if any(sources.values()) else "none stated"
-
-
-def _lambda(found: Mapping[str, Any], level: str) -> Table:
-    """Key terms for several weights of steady runs; ``found``: term -> {weight: value}."""
-    weights = list(dict.fromkeys(weight for values in found.values() for weight in values))
-    rows = tuple((name, *(number(values.get(weight)) for weight in weights)) for name, values in found.items())
-    head = ("Term", *(f"lambda = {weight}" for weight in weights))
-    return Table(
-        "Weight of steady runs against oscillations", head, rows, stated(level, "compare with the std of each term")
-    )
 
 
 def limits(study: Study, book: Sketchbook) -> Section:

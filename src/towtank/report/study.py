@@ -19,6 +19,7 @@ from towtank.tank.run import Run
 from towtank.trials.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from towtank.derive.study import FrequencyStudy
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
     from towtank.verdict.table import Verdict
@@ -28,6 +29,7 @@ STAGES = {
     "plan": "Pass the Plan, or run `towtank plan`.",
     "runs": "Pass the runs, or run `towtank tow`.",
     "derivatives": "Pass the Derivatives, or run `towtank derive`.",
+    "frequency": "Pass the FrequencyStudy, or run `towtank derive` on runs that oscillate.",
     "trials": "Pass trajectories, or run `towtank trial`.",
     "mc": "Pass the MonteCarlo, or run `towtank mc`.",
     "verdict": "Pass the Verdict, or run `towtank assess`.",
@@ -50,6 +52,7 @@ class Study:
     plan: Plan | None = None
     runs: tuple[Run, ...] = ()
     derivatives: Derivatives | None = None
+    frequency: FrequencyStudy | None = None
     model: Model | None = None
     trajectories: tuple[Trajectory, ...] = ()
     mc: MonteCarlo | None = None
@@ -159,16 +162,17 @@ def _part(thing: Any) -> str:
     for kind, name in plain:
         if isinstance(thing, kind):
             return name
+    from towtank.derive.study import FrequencyStudy
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
     from towtank.verdict.table import Verdict
 
-    for of, name in ((Model, "model"), (MonteCarlo, "mc"), (Verdict, "verdict")):
+    for of, name in ((FrequencyStudy, "frequency"), (Model, "model"), (MonteCarlo, "mc"), (Verdict, "verdict")):
         if isinstance(thing, of):
             return name
     raise InputError(
-        f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, GridStudy, Derivatives, Model, "
-        "Trajectory, MonteCarlo, Verdict, or sequences of them."
+        f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, GridStudy, Derivatives, "
+        "FrequencyStudy, Model, Trajectory, MonteCarlo, Verdict, or sequences of them."
     )
 
 
@@ -202,6 +206,7 @@ def read_study(folder: Path | str) -> Study:
 
     from towtank.craft.library import read_craft
     from towtank.derive.files import read_derivatives
+    from towtank.derive.study_files import read_frequencies
     from towtank.experiments.files import own_plan, read_optimal
     from towtank.grid.files import read_grid
     from towtank.montecarlo.files import read_mc
@@ -218,6 +223,7 @@ def read_study(folder: Path | str) -> Study:
         derivatives=attempt(
             "derivatives", files["derivatives.json"], lambda: read_derivatives(files["derivatives.json"])
         ),
+        frequency=attempt("frequency", root / "frequency.json", lambda: read_frequencies(root / "frequency.json")),
         trajectories=attempt("trials", files["trials"], lambda: _trajectories(files["trials"]), ()),
         mc=attempt("mc", root / "mc.json", lambda: read_mc(root)),
         verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
