@@ -47,7 +47,9 @@ def _screening(study: Study, it: Derivatives, book: Sketchbook) -> list[Block]:
         words = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
         blocks += [Text(f"Every run was judged by stated tests: {words}."), _tests(found, it.level)]
     else:
-        blocks.append(missing("The runs behind these derivatives were not screened.", STAGES["derivatives"]))
+        blocks.append(
+            missing("The runs behind these derivatives were not screened.", "Run `towtank derive --screening`.")
+        )
     if doubtful:
         blocks.append(_doubtful(doubtful, it.level))
     if left := [(name, why) for name, why in it.rejected if name not in doubtful]:
