@@ -17,6 +17,7 @@ _PUBLIC = {
     "tow": "towtank.tank.campaign",
     "FastTank": "towtank.tank.fast.tank",
     "LpmTank": "towtank.tank.lpm",
+    "import_runs": "towtank.tank.imported.gate",
     "Run": "towtank.tank.run",
     "Derivatives": "towtank.derive.table",
     "read_coefficients": "towtank.derive.published",
