@@ -3,15 +3,14 @@
 220 runs: 200 oscillations of 2000 settled samples each and 20 steady ones, from known coefficients with 2 % noise, once
 without a model-form ensemble and once with 48 members. Each case runs in a process of its own, which settles the
 samples, identifies, and prints wall time, processor time (all threads) and memory; ``derive_s`` is the whole of
-``derive`` with its screening. ``load`` is that of the machine before it began. Prints a table with the goals and writes
-bench/derive.json; ``--keep`` also writes benchmarks/derive.json, which the repository keeps.
+``derive`` with its screening. Prints a table with the goals and writes bench/derive.json; ``--keep`` also writes
+benchmarks/derive.json, which the repository keeps.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
 import resource
 import subprocess
 import sys
@@ -101,7 +100,7 @@ def main() -> None:
     if options.one is not None:
         print(json.dumps(one(options.one)))
         return
-    where, numbers = machine(), {"load": float(f"{os.getloadavg()[0]:.2g}")}
+    where, numbers = machine(), {}
     for members in (0, MEMBERS):
         words = [sys.executable, __file__, "--one", str(members)]
         found = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
