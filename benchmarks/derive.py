@@ -4,8 +4,8 @@
 without a model-form ensemble and once with 48 members. Each case runs in a process of its own, which settles the
 samples, identifies, and prints wall time, processor time (all threads) and memory; ``derive_s`` is the whole of
 ``derive`` with its screening. BLAS has one thread: its matrices are small here, and on a machine that is also busy
-elsewhere two threads spend as long again waiting for each other. Prints a table with the goals and writes bench/derive.json; ``--keep`` also writes
-benchmarks/derive.json, which the repository keeps.
+elsewhere two threads spend as long again waiting for each other. Prints a table with the goals and writes
+bench/derive.json; ``--keep`` also writes benchmarks/derive.json, which the repository keeps.
 """
 
 from __future__ import annotations
