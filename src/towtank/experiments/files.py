@@ -93,7 +93,6 @@ def optimal_document(optimal: Optimal) -> dict[str, Any]:
         "least_size": None if optimal.least_size is None else plain(optimal.least_size),
         "saves": optimal.saves,
         "not_determined": list(optimal.open_terms),
-        "search": list(optimal.values_of_search),
         "provenance": provenance(),
     }
 
@@ -114,7 +113,7 @@ def saving(found: Mapping[str, Any]) -> str:
         return f"No smaller plan was found that leaves every value as certain as the standard one.{by_size}{at_equal}"
     return (
         f"Saves {saves['runs']:g} runs of {saves['of_runs']:g} that bear on it in the standard plan, and "
-        f"{saves['cost']:.1f} of {saves['of_cost']:.1f} in cost: {least['number']} runs leave every value as certain."
+        f"{saves['cost']:.1f} of {saves['of_cost']:.1f} in cost: {least['number']} runs leave every value as certain, by prediction."
         f"{by_size}{at_equal}"
     )
 

@@ -15,8 +15,15 @@ from towtank.errors import InputError
 from towtank.experiments.candidates import candidates
 from towtank.experiments.cost import CFD, CostModel, costs
 from towtank.experiments.errors import ErrorModel
-from towtank.experiments.evidence import Evidence, fit_weights, index_evidence, stability_index, wide_evidence
-from towtank.experiments.exchange import BETTER, Design, Grid, exchange, optimise
+from towtank.experiments.evidence import (
+    ROUND_OFF,
+    Evidence,
+    fit_weights,
+    index_evidence,
+    stability_index,
+    wide_evidence,
+)
+from towtank.experiments.exchange import BETTER, Grid, exchange, optimise
 from towtank.experiments.forecast import Forecast, forecast
 from towtank.frames import Array
 from towtank.plan.kinds import Plan
@@ -27,6 +34,13 @@ CRITERIA = ("D", "A")
 BEARS = 0.01
 """Smallest share of the information on an unknown for which a run of the standard plan bears on the aim."""
 
+
+LARGER = 2
+"""Size of the set that is thinned, over the size wanted (judgement: 3 and 5 gave sets alike)."""
+
+LEAST_KIND = 7
+"""Steady runs of a kind below which a plan is not thinned: two values fitted and five degrees of freedom, where the
+factor for weights found from few ends. Rehearsed campaigns with fewer scatter several times as much as predicted."""
 
 ROUNDS = 8
 """Most searches with the lagging values counted more (judgement: later ones move a value by a few per cent)."""
@@ -59,7 +73,6 @@ class Optimal:
     least : the smallest plan found that leaves no wanted value more uncertain than the standard plan does, or None.
     least_size : the smallest found whose ``size`` is no larger than that of the standard plan, or None.
     open_terms : unknowns of the model that the plan does not determine.
-    values_of_search : the criterion after each change of the search, never rising.
     """
 
     plan: Plan
@@ -79,7 +92,6 @@ class Optimal:
     least: Scored | None
     least_size: Scored | None
     open_terms: tuple[str, ...] = ()
-    values_of_search: tuple[float, ...] = ()
     problem: Problem | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -134,23 +146,23 @@ def optimal_plan(
     problem = Problem(
         craft, cast, told, _evidence(cast, told, craft, tuple(aim)), costs(cast.pool.tests, craft, cost), criterion
     )
-    design = problem.best(budget)
-    tests = tuple(cast.pool.tests[i] for i in design.chosen)
-    chosen = problem.score(design.chosen)
+    best = problem.best(budget)
+    tests = tuple(cast.pool.tests[i] for i in best)
+    chosen = problem.score(best)
     if not all(math.isfinite(std) for std in chosen.std.values()):
         raise InputError(
             f"--budget {budget}: {', '.join(n for n, s in chosen.std.items() if not math.isfinite(s))} cannot be "
             f"determined by {budget} runs of this cost. {problem.remedy(budget)}"
         )
-    least, least_size = problem.least(), problem.least_size()
+    least, least_size = problem.least, problem.least_size()
     return Optimal(
         plan=Plan(craft, cast.pool.speed, tests, _notes(cast, aim, criterion)),
         aim=tuple(problem.evidence.wanted), criterion=criterion, budget=budget, values=_values(problem),
         source=cast.source, error=told, cost_model=cost, unit=problem.unit, candidates=len(cast.runs), chosen=chosen,
         standard=problem.score(cast.standard), bearing=problem.score(problem.bearing),
-        equal=problem.score(problem.equal.chosen), least=None if least is None else problem.score(least),
+        equal=problem.score(problem.equal), least=None if least is None else problem.score(least),
         least_size=None if least_size is None else problem.score(least_size),
-        open_terms=problem.open(design.chosen), values_of_search=design.values, problem=problem,
+        open_terms=problem.open(best), problem=problem,
     )  # fmt: skip
 
 
@@ -194,9 +206,9 @@ class Problem:
         return tuple(i for i, row in zip(at, share[:, used], strict=True) if row.max() > BEARS)
 
     @cached_property
-    def equal(self) -> Design:
-        """The best design of as many runs as bear on the aim, at no more than their cost."""
-        return optimise(self.grid, len(self.bearing), float(self.cost[list(self.bearing)].sum()))
+    def equal(self) -> tuple[int, ...]:
+        """The best set of as many runs as bear on the aim, at no more than their cost."""
+        return self._best(len(self.bearing), float(self.cost[list(self.bearing)].sum()))
 
     def numbers(self, names: Sequence[str]) -> tuple[int, ...]:
         """Numbers of the candidates called ``names``."""
@@ -222,10 +234,48 @@ class Problem:
         cost = float(self.cost[list(chosen)].sum()) / self.unit
         return Scored(names, cost, dict(zip(self.evidence.wanted, std.tolist(), strict=True)), size)
 
-    def best(self, runs: int, starts: int = 2) -> Design:
-        """The best design of at most ``runs`` runs that cost no more than as many mean runs of the standard plan."""
-        return optimise(self.grid, runs, runs * self.unit, starts)
+    def best(self, runs: int) -> tuple[int, ...]:
+        """The best set of at most ``runs`` runs that cost no more than as many mean runs of the standard plan."""
+        return self._best(runs, runs * self.unit)
 
+    def _best(self, most: int, budget: float) -> tuple[int, ...]:
+        """The search sees weights and errors simplified; so a larger set is thinned by what the fit will leave too."""
+        found = [optimise(self.grid, most, budget).chosen]
+        larger = optimise(self.grid, LARGER * most, LARGER * budget, starts=1).chosen
+        found.append(self._within(larger, most, budget))
+        least = self.least or ()
+        if len(least) <= most and self.cost[list(least)].sum() <= budget:
+            found.append(least)
+        return min(filter(None, found), key=lambda chosen: float(self._measure(self.covariance(chosen))), default=())
+
+    def _measure(self, covariance: Array) -> Array:
+        """The criterion, of covariances (..., s, s)."""
+        if self.criterion == "D":
+            return _volume(covariance)
+        return np.asarray((self._excess(covariance) ** 2).mean(axis=-1))
+
+    def _within(self, start: Sequence[int], most: int, budget: float) -> tuple[int, ...]:
+        """``start`` without the runs that tell least, until it keeps number and cost; empty when it cannot."""
+        chosen = list(start)
+        while len(chosen) > most or self.cost[chosen].sum() > budget * (1.0 + ROUND_OFF):
+            kinds = [self.evidence.family[i] for i in chosen]
+            small = np.array([bool(kind) and kinds.count(kind) <= LEAST_KIND for kind in kinds])
+            rise = np.where(small, np.inf, self._rise(chosen, self._measure))
+            if not np.isfinite(rise).any():
+                return ()
+            dear = rise / self.cost[chosen] if self.cost[chosen].sum() > budget else rise
+            del chosen[int(np.argmin(dear))]
+        return tuple(sorted(chosen))
+
+    def _rise(self, chosen: Sequence[int], measure: Callable[[Array], Array]) -> Array:
+        """Rise (len(chosen),) of ``measure`` without each run; infinite where a value is then open."""
+        now = float(measure(self.covariance(chosen)))
+        if not math.isfinite(now):
+            return np.full(len(chosen), np.inf)
+        left = measure(self.evidence.without_each(chosen, self.weight(chosen)))
+        return np.asarray(np.where(np.isfinite(left), left - now, np.inf))
+
+    @cached_property
     def least(self) -> tuple[int, ...] | None:
         """The smallest set found with no wanted value more uncertain than by the standard plan."""
         return self._thinned(self._balanced(), self._worst, 1.0)
@@ -242,25 +292,26 @@ class Problem:
     def _worst(self, covariance: Array) -> Array:
         return np.asarray(self._excess(covariance).max(axis=-1))
 
-    def _balanced(self) -> Design:
-        """``equal`` exchanged so that no value lags: A-optimal, laggards counted more each round; the best round."""
-        found, grid = [self.equal], replace(self.grid, criterion="A")
+    def _balanced(self) -> tuple[int, ...]:
+        """As ``equal``, but so that no value lags: A-optimal, laggards counted more each round; the best round."""
         budget = float(self.cost[list(self.bearing)].sum())
+        found = [optimise(self.grid, len(self.bearing), budget).chosen]
+        grid = replace(self.grid, criterion="A")
         for _ in range(ROUNDS):
-            excess = self._excess(self.covariance(found[-1].chosen))
+            excess = self._excess(self.covariance(found[-1]))
             if not np.isfinite(excess).all():
                 break
             grid = replace(grid, wanted=grid.wanted * excess[:, None])
-            found.append(exchange(grid, found[-1].chosen, len(self.bearing), budget))
-        return min(found, key=lambda design: float(self._worst(self.covariance(design.chosen))))
+            found.append(exchange(grid, found[-1], len(self.bearing), budget).chosen)
+        return min(found, key=lambda chosen: float(self._worst(self.covariance(chosen))))
 
-    def _thinned(self, start: Design, measure: Callable[[Array], Array], limit: float) -> tuple[int, ...] | None:
+    def _thinned(self, start: Sequence[int], measure: Callable[[Array], Array], limit: float) -> tuple[int, ...] | None:
         """``start`` without the runs that it can spare while ``measure`` stays within ``limit``.
 
         Each time the run goes that raises ``measure`` least for its cost. None when ``start`` itself is beyond.
         """
         limit += BETTER * max(abs(limit), 1.0)
-        chosen = list(start.chosen)
+        chosen = list(start)
         if not measure(self.covariance(chosen)) <= limit:
             return None
         while (rest := self._spared(chosen, measure, limit)) is not None:
@@ -268,9 +319,9 @@ class Problem:
         return tuple(chosen)
 
     def _spared(self, chosen: list[int], measure: Callable[[Array], Array], limit: float) -> list[int] | None:
-        left = measure(self.evidence.without_each(chosen, self.weight(chosen)))
-        dear = np.where(left <= limit, (left - measure(self.covariance(chosen))) / self.cost[chosen], np.inf)
-        for at in np.argsort(dear)[: np.isfinite(dear).sum()]:
+        rise = self._rise(chosen, measure)
+        able = rise <= limit - float(measure(self.covariance(chosen)))
+        for at in np.argsort(np.where(able, rise / self.cost[chosen], np.inf))[: able.sum()]:
             rest = [*chosen[:at], *chosen[at + 1 :]]
             # The weights change with the set, so it is judged anew.
             if measure(self.covariance(rest)) <= limit:
@@ -287,7 +338,7 @@ class Problem:
     def remedy(self, budget: int) -> str:
         """The least budget that determines the aim, in words."""
         for runs in range(budget + 1, len(self.cast.runs)):
-            if np.isfinite(self.covariance(self.best(runs, starts=1).chosen)).all():
+            if np.isfinite(self.covariance(optimise(self.grid, runs, runs * self.unit, starts=1).chosen)).all():
                 return f"Give --budget {runs} or more, or aim at fewer terms with --for."
         return "Aim at fewer terms with --for."
 
