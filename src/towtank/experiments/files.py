@@ -113,8 +113,8 @@ def saving(found: Mapping[str, Any]) -> str:
         return f"No smaller plan was found that leaves every value as certain as the standard one.{by_size}{at_equal}"
     return (
         f"Saves {saves['runs']:g} runs of {saves['of_runs']:g} that bear on it in the standard plan, and "
-        f"{saves['cost']:.1f} of {saves['of_cost']:.1f} in cost: {least['number']} runs leave every value as certain, by prediction."
-        f"{by_size}{at_equal}"
+        f"{saves['cost']:.1f} of {saves['of_cost']:.1f} in cost: {least['number']} runs leave every value as certain, "
+        f"by prediction.{by_size}{at_equal}"
     )
 
 
