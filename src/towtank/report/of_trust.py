@@ -16,9 +16,9 @@ from towtank.symbols import TERMS
 LIMITS = (
     "The body is deeply submerged in unbounded water at rest or in a uniform current; no waves, free surface, walls "
     "or bottom.",
-    "The model has no terms with sway and yaw together (or heave and pitch) but the axial ones, unless third-order terms "
-    "stand in the table of coefficients; no interaction of fin angle and drift beyond the straightening factors; and no memory of "
-    "the flow. It holds ahead, within the angles and rates of the captive tests.",
+    "The model has no terms with sway and yaw together (or heave and pitch) but the axial ones, unless third-order "
+    "terms stand in the table of coefficients; no interaction of fin angle and drift beyond the straightening factors; "
+    "and no memory of the flow. It holds ahead, within the angles and rates of the captive tests.",
     "The indices are those of the nominal coefficients unless a standard uncertainty is printed beside them.",
 )
 TANK_LIMITS = (
