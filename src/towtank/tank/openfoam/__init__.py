@@ -1,0 +1,1 @@
+"""Captive tests in OpenFOAM: cases written, run, watched and read. Its programs are called, never linked."""

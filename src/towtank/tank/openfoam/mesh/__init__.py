@@ -1,0 +1,1 @@
+"""Structured meshes around hull and fins, and what is measured on them."""
