@@ -108,7 +108,7 @@ def mesh_of(
     def radial(s: float, arc: Array, r: Array) -> Array:
         return geometric(wall, out, float(arc[-1]))
 
-    theta = np.arange(2 * around) * np.pi / around
+    theta = np.linspace(0.0, 2.0 * np.pi, 2 * around, endpoint=False)
     body = mesh_lines(shape, stations[ends : along - ends + 1], radial)
     planes = theta[: around + 1] if half else theta
     points = _turned(body[:, :, None], planes[None, None, :])

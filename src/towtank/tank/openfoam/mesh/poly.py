@@ -31,7 +31,10 @@ class Patch:
 
 @dataclass(frozen=True)
 class PolyMesh:
-    """Points (P, 3) [m], faces (F, 4) of point labels (-1 closes a triangle), owner (F,), neighbour (I,) of the first I."""
+    """Points (P, 3) [m] and faces (F, 4) of point labels; -1 closes a triangle.
+
+    ``owner`` (F,): the cell a face belongs to; ``neighbour`` (I,): the other cell of the first I faces.
+    """
 
     points: Array
     faces: Labels
@@ -158,7 +161,8 @@ def write_mesh(mesh: PolyMesh, case: Path) -> None:
     """
     folder = case / "constant" / "polyMesh"
     folder.mkdir(parents=True, exist_ok=True)
-    note = f"nPoints:{len(mesh.points)}  nCells:{mesh.cells}  nFaces:{len(mesh.faces)}  nInternalFaces:{len(mesh.neighbour)}"
+    note = f"nPoints:{len(mesh.points)}  nCells:{mesh.cells}  nFaces:{len(mesh.faces)}"
+    note += f"  nInternalFaces:{len(mesh.neighbour)}"
     corners = np.where(mesh.faces[:, 3] < 0, 3, 4)
     offsets = np.r_[0, np.cumsum(corners)]
     _write(folder, "points", "vectorField", [np.ascontiguousarray(mesh.points, dtype="<f8")])

@@ -1,4 +1,4 @@
-"""What a mesh is worth: volumes, closedness, non-orthogonality, skewness and aspect ratio, as checkMesh measures them."""
+"""Quality of a mesh as checkMesh measures it: volumes, closedness, non-orthogonality, skewness, aspect ratio."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TINY = 1e-300
 
 @dataclass(frozen=True)
 class Quality:
-    """Measures of a mesh. Volumes in m3, angles in degrees; ``openness`` is the largest open share of a cell's faces."""
+    """Measures of a mesh: volumes in m3, angles in degrees. ``openness``: largest open share of a cell's faces."""
 
     cells: int
     volume: float

@@ -20,7 +20,7 @@ def friction(reynolds: float) -> float:
     Source     ittc75020602: the ITTC-57 line, 0.075 / (log10 Re - 2)^2.
     Valid      Turbulent flow. Local friction is a tenth below the mean at Re 1e7, so y+ is on the high side.
     """
-    return 0.075 / (np.log10(max(reynolds, LOWEST_REYNOLDS)) - 2.0) ** 2
+    return float(0.075 / (np.log10(max(reynolds, LOWEST_REYNOLDS)) - 2.0) ** 2)
 
 
 def first_cell(y_plus: float, speed: float, length: float, viscosity: float) -> float:
@@ -38,11 +38,11 @@ def geometric(first: float, count: int, total: float) -> Array:
         return np.linspace(0.0, total, count + 1)
     ratio = brentq(lambda q: first * np.expm1(count * np.log(q)) - total * (q - 1.0), 1.0 + 1e-9, 1e3)
     steps = ratio ** np.arange(count)
-    return np.r_[0.0, np.cumsum(steps)] * total / steps.sum()
+    return np.asarray(np.r_[0.0, np.cumsum(steps)] * total / steps.sum())
 
 
 def two_sided(first: float, last: float, count: int, total: float) -> Array:
-    """Positions (count + 1,) from 0 to ``total``: steps near ``first`` and ``last`` at the ends, growing alike inwards."""
+    """Positions (count + 1,) from 0 to ``total``: steps ``first`` and ``last`` at the ends, growing alike inwards."""
     x = np.linspace(0.0, total, 801)
 
     def spent(growth: float) -> Array:
@@ -56,12 +56,12 @@ def two_sided(first: float, last: float, count: int, total: float) -> Array:
     else:
         growth = brentq(lambda g: spent(g)[-1] - count, least, 20.0)
     cells = spent(growth)
-    return np.interp(np.arange(count + 1), cells * count / cells[-1], x)
+    return np.asarray(np.interp(np.arange(count + 1), cells * count / cells[-1], x))
 
 
 def cumulative(s: Array, size: Array) -> Array:
     """Cells (n,) spent from the start of the line ``s`` (n,) [m] when they have the local ``size`` (n,) [m]."""
-    return np.r_[0.0, np.cumsum(0.5 * (1.0 / size[1:] + 1.0 / size[:-1]) * np.diff(s))]
+    return np.asarray(np.r_[0.0, np.cumsum(0.5 * (1.0 / size[1:] + 1.0 / size[:-1]) * np.diff(s))])
 
 
 def scaled(s: Array, size: Callable[[float], Array], count: float) -> Array:
