@@ -57,6 +57,7 @@ def tow(
     chosen = _fast_tank() if tank is None else tank
     told: Progress = Silent() if progress is None else progress
     folder = None if out is None else _writable(Path(out))
+    chosen = _placed(chosen, folder)
     runs: list[Run] = []
     told.start(TASK, len(plan.tests))
     try:
@@ -87,6 +88,13 @@ def _fast_tank() -> Tank:
     from towtank.tank.fast.tank import FastTank
 
     return FastTank()
+
+
+def _placed(tank: Tank, folder: Path | None) -> Tank:
+    """The tank with its own files, such as cases, below the study folder; most tanks have none."""
+    below = getattr(tank, "below", None)
+    placed: Tank = tank if folder is None or below is None else below(folder)
+    return placed
 
 
 def _writable(folder: Path) -> Path:

@@ -1,0 +1,163 @@
+"""OpenFoamTank: captive tests by RANS. Level rans."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from towtank.craft.craft import Craft
+from towtank.errors import ArtefactError, InputError
+from towtank.plan.kinds import CaptiveTest
+from towtank.progress import Progress
+from towtank.tank.identity import run_id
+from towtank.tank.openfoam.case import Case, read_case, write_case
+from towtank.tank.openfoam.find import require
+from towtank.tank.openfoam.formulation import Straight, domain_of
+from towtank.tank.openfoam.mesh.grid import MeshSettings
+from towtank.tank.openfoam.numerics import Numerics
+from towtank.tank.openfoam.read import run_of
+from towtank.tank.openfoam.runner import solve
+from towtank.tank.run import Run
+
+LEVEL = "rans"
+PHYSICS = 1
+"""Raised when the cases change, so that runs made with the former ones are not taken for their own."""
+
+PRESETS: dict[str, tuple[MeshSettings, Numerics]] = {
+    "draft": (MeshSettings(along=60, around=16, out=32, y_plus=60.0, far=2.5), Numerics()),
+    "standard": (MeshSettings(along=80, around=24, out=40, y_plus=60.0, far=2.5), Numerics(turbulence="kOmegaSST")),
+    "fine": (
+        MeshSettings(along=120, around=36, out=60, y_plus=45.0, far=4.0),
+        Numerics(turbulence="kOmegaSST", steps=200, iterations=1500),
+    ),
+}
+"""Quality -> mesh and numerics. y+ of draft and standard: the first cell of the runs that were measured."""
+
+
+@dataclass(frozen=True)
+class OpenFoamTank:
+    """RANS on a structured mesh, run by OpenFOAM on this machine.
+
+    quality : a key of ``PRESETS``.   turbulence : model in its place, a key of ``numerics.MODELS``.
+    refinement : factor on the cells each way: meshes of one family.   cores : processes of one case.
+    mesh, numerics : settings in place of the preset's.
+    where : study folder; cases lie in ``runs/<id>/case``. Without it they are made in a temporary folder and removed.
+    from_neighbour : straight runs start from the nearest one that is solved on the same mesh, where there is one.
+    """
+
+    quality: str = "draft"
+    turbulence: str | None = None
+    refinement: float = 1.0
+    cores: int = 1
+    mesh: MeshSettings | None = None
+    numerics: Numerics | None = None
+    where: Path | None = None
+    from_neighbour: bool = True
+
+    def __post_init__(self) -> None:
+        if self.quality not in PRESETS:
+            raise InputError(
+                f"OpenFoamTank: quality {self.quality!r} is not known. Choose one of {', '.join(PRESETS)}."
+            )
+        if not 0.2 <= self.refinement <= 8.0:
+            raise InputError(
+                f"OpenFoamTank: refinement {self.refinement:g} is outside 0.2 to 8. Below it the mesh loses the hull, "
+                "above it it has 500 times the cells. Give a number near 1."
+            )
+
+    @property
+    def level(self) -> str:
+        """Level of evidence."""
+        return LEVEL
+
+    @property
+    def mesh_settings(self) -> MeshSettings:
+        """Mesh of the preset or as given, refined."""
+        chosen = PRESETS[self.quality][0] if self.mesh is None else self.mesh
+        return replace(chosen, refinement=chosen.refinement * self.refinement)
+
+    @property
+    def solution(self) -> Numerics:
+        """Numerics of the preset or as given, with the turbulence model asked for."""
+        chosen = PRESETS[self.quality][1] if self.numerics is None else self.numerics
+        return chosen if self.turbulence is None else replace(chosen, turbulence=self.turbulence)
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that decides the result beside craft and test. Cores and folders do not."""
+        installation = require()
+        return {
+            "tank": "openfoam",
+            "physics": PHYSICS,
+            "quality": self.quality,
+            "mesh": asdict(self.mesh_settings),
+            "numerics": asdict(self.solution),
+            "openfoam": f"{installation.version} {installation.kind}",
+        }
+
+    def below(self, study: Path) -> OpenFoamTank:
+        """The same tank with its cases in the folder ``study``."""
+        return self if self.where is not None else replace(self, where=study)
+
+    def run(self, craft: Craft, test: CaptiveTest, progress: Progress) -> Run:
+        """Run one captive test: write its case, or go on with the one on file, solve and read it.
+
+        Raises
+        ------
+        TankError
+            OpenFOAM is missing, or the solver failed; what is on file stays for the next call.
+        """
+        installation = require()
+        with self._folder(craft, test) as folder:
+            case = self._case(folder, craft, test)
+            case, outcome = solve(case, installation, progress)
+            return run_of(case, craft, test, self, outcome)
+
+    @contextmanager
+    def _folder(self, craft: Craft, test: CaptiveTest) -> Iterator[Path]:
+        if self.where is not None:
+            yield Path(self.where) / "runs" / run_id(craft, test, self) / "case"
+            return
+        with tempfile.TemporaryDirectory(prefix="towtank-") as folder:
+            yield Path(folder) / "case"
+
+    def _case(self, folder: Path, craft: Craft, test: CaptiveTest) -> Case:
+        """The case on file, or a fresh one."""
+        if folder.exists():
+            try:
+                return read_case(folder)
+            except ArtefactError:
+                shutil.rmtree(folder)
+        start = self._neighbour(craft, test) if self.from_neighbour else None
+        return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, start)
+
+    def _neighbour(self, craft: Craft, test: CaptiveTest) -> Path | None:
+        """The solved straight case of the same mesh whose inflow is nearest."""
+        if self.where is None or test.motion.period or test.motion.history(np.zeros(1)).nu[0, 5]:
+            return None
+        domain = domain_of(craft, test, self.mesh_settings.half)
+        nu = test.motion.history(np.zeros(1)).nu[0, :3]
+        found: list[tuple[float, Path]] = []
+        for done in sorted((Path(self.where) / "runs").glob("*/case/outcome.json")):
+            try:
+                other = read_case(done.parent)
+            except ArtefactError:
+                continue
+            alike = (
+                isinstance(other.formulation, Straight)
+                and other.domain == domain
+                and other.numerics == self.solution
+                and other.craft == craft.name
+                and other.test.speed == test.speed
+                and (other.test.fins or (0.0,) * len(craft.fins)) == (test.fins or (0.0,) * len(craft.fins))
+            )
+            if alike and isinstance(other.formulation, Straight):
+                inflow = domain.to_body(np.array(other.formulation.inflow))
+                found.append((float(np.linalg.norm(inflow + nu)), done.parent))
+        return min(found)[1] if found else None
