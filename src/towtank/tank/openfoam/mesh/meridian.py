@@ -18,6 +18,7 @@ from towtank.craft.integrals import stations
 from towtank.frames import Array
 
 _FINE = 6001
+_DISC = 400
 _DRAWN = 1200
 """Points that draw a line; the first lie 1e-7 of its length apart."""
 _RELAX = 1.3
@@ -51,6 +52,11 @@ class Outline:
         """Arc from nose to tail [m]."""
         return float(self.s[-1])
 
+    def radius(self, x: Array) -> Array:
+        """Radius [m] at the distances ``x`` aft of the nose; at a flat end that of its edge."""
+        round_part = slice(_DISC if self.blunt[0] else 0, len(self.x) - (_DISC if self.blunt[1] else 0))
+        return np.asarray(np.interp(x, self.x[round_part], self.r[round_part]))
+
     def at(self, s: Array) -> tuple[Array, Array]:
         """Distance aft of the nose and radius [m] of the points at arc ``s``."""
         return np.interp(s, self.s, self.x), np.interp(s, self.s, self.r)
@@ -79,11 +85,11 @@ def outline(profile: Profile, far: float) -> Outline:
     blunt = (float(r[0]), float(r[-1]))
     blunt = (blunt[0] if blunt[0] > 1e-3 * r.max() else 0.0, blunt[1] if blunt[1] > 1e-3 * r.max() else 0.0)
     r[0], r[-1] = blunt
-    nose, tail = (np.linspace(0.0, 1.0, 400, endpoint=False) * end for end in blunt)
+    nose, tail = (np.linspace(0.0, 1.0, _DISC, endpoint=False) * end for end in blunt)
     if blunt[0]:
-        x, r = np.r_[np.zeros(400), x], np.r_[nose, r]
+        x, r = np.r_[np.zeros(_DISC), x], np.r_[nose, r]
     if blunt[1]:
-        x, r = np.r_[x, np.full(400, length)], np.r_[r, tail[::-1]]
+        x, r = np.r_[x, np.full(_DISC, length)], np.r_[r, tail[::-1]]
     s = np.r_[0.0, np.cumsum(np.hypot(np.diff(x), np.diff(r)))]
     near = 0.02 * length
     f = [float(np.clip(profile.radius(np.array(at)) ** 2 / (4.0 * near), 1e-3 * length, 0.03 * length))
