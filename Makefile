@@ -11,11 +11,12 @@ OUT    ?= hokie
 ENGINE := hatch_build.py $(wildcard src/towtank/symbols.py src/towtank/engine/*.py src/towtank/engine/c/* \
             src/towtank/model/*.py src/towtank/pilot/*.py)
 
-.PHONY: help install run test lint bench bench-engine bench-derive validate validate-slurm clean
+.PHONY: help install openfoam run test lint bench bench-engine bench-derive validate validate-slurm clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make install   the package into $(VENV)/, its engine compiled; the command is $(BIN)/towtank"
+	@echo "make openfoam  OpenFOAM by apt-get, as root, on Debian or Ubuntu; the tests need it"
 	@echo "make run       towtank run hokie, results in ./$(OUT)"
 	@echo "make test      ruff, mypy, import-linter, pytest"
 	@echo "make lint      the first three of these"
@@ -42,6 +43,9 @@ $(VENV)/.engine: $(ENGINE) | $(VENV)/.installed
 $(VENV)/.tools: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --group dev
 	@touch $@
+
+openfoam:
+	@bash .ci/openfoam.sh
 
 run: $(VENV)/.engine
 	$(BIN)/towtank run hokie --out "$(OUT)"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import platform
-import shutil
 from importlib import metadata
 from typing import Any
 
@@ -120,11 +119,18 @@ def _optional() -> list[dict[str, Any]]:
     return [
         _item("casadi", _version_of("casadi"), False, "compiles other forms of the engine", "pip install casadi"),
         _item("C compiler", compiler() or "", False, "the same", "apt-get install gcc, or your system's compiler"),
-        _item(
-            "OpenFOAM",
-            os.environ.get("WM_PROJECT_VERSION", "") or shutil.which("simpleFoam") or "",
-            False,
-            "captive tests by CFD",
-            "install OpenFOAM and source its etc/bashrc before calling towtank",
-        ),
+        _openfoam(),
     ]
+
+
+def _openfoam() -> dict[str, Any]:
+    from towtank.tank.openfoam.find import REMEDY, find, missing, unfit
+
+    found = find()
+    if found is None:
+        return _item("OpenFOAM", "", False, "captive tests by CFD", REMEDY)
+    lacking, why = missing(found), unfit(found)
+    if lacking or why:
+        remedy = f"{why or 'it lacks ' + ', '.join(lacking) + '.'} {REMEDY}"
+        return _item("OpenFOAM", "", False, f"captive tests by CFD; {found.version} in {found.project}", remedy)
+    return _item("OpenFOAM", f"{found.version} ({found.kind})", False, f"captive tests by CFD; {found.project}", "")

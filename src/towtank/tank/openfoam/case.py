@@ -27,6 +27,7 @@ from towtank.tank.openfoam.formulation import (
     StillWater,
     Straight,
     domain_of,
+    fastest,
     formulation_of,
 )
 from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
@@ -115,37 +116,17 @@ def write_case(
             f"{folder} is not empty. A case is written into a fresh folder, because the solver would go on from "
             "what it finds there; remove it, or name another."
         )
-    domain = domain_of(craft, test, mesh_settings.half)
-    formulation = formulation_of(test, domain)
-    meshed = domain.craft_in_mesh(craft)
-    angles = test.fins or (0.0,) * len(craft.fins)
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     try:
         shutil.rmtree(part, ignore_errors=True)
         part.mkdir(parents=True)
-        mesh = mesh_of(meshed, mesh_settings, half=domain.half, fins=angles, speed=test.speed)
-        write_mesh(mesh, part)
-        case = Case(
-            folder=part,
-            test=test,
-            craft=craft.name,
-            formulation=formulation,
-            domain=domain,
-            numerics=numerics,
-            line=None if test.motion.period == 0.0 else timeline(test, numerics.steps, numerics.ramp),
-            walls=tuple(patch.name for patch in mesh.patches if patch.kind == "wall"),
-            cells=mesh.cells,
-            label=label_of(mesh_settings),
-            mesh=_hash(mesh),
-            length=craft.length,
-            density=craft.water.density,
-            ranks=ranks,
-        )
+        case = _meshed(part, craft, test, mesh_settings, numerics, ranks)
         _write_text(case, craft)
         if start_from is not None:
             case = replace(case, start=_start(case, start_from))
         write_document(case)
-        _free(folder)
+        if folder.exists():
+            folder.rmdir()
         part.replace(folder)
     except OSError as error:
         raise ArtefactError(
@@ -157,9 +138,33 @@ def write_case(
     return replace(case, folder=folder)
 
 
-def _free(folder: Path) -> None:
-    if folder.exists():
-        folder.rmdir()
+def _meshed(
+    folder: Path, craft: Craft, test: CaptiveTest, mesh_settings: MeshSettings, numerics: Numerics, ranks: int
+) -> Case:
+    """The case, of which only the mesh is written yet."""
+    domain = domain_of(craft, test, mesh_settings.half)
+    formulation = formulation_of(test, domain, craft.length)
+    angles = test.fins or (0.0,) * len(craft.fins)
+    # One mesh for all tests at a speed; only where there is hardly a tow does the motion set the first cell.
+    speed = fastest(test, craft.length) if isinstance(formulation, StillWater) else test.speed
+    mesh = mesh_of(domain.craft_in_mesh(craft), mesh_settings, half=domain.half, fins=angles, speed=speed)
+    write_mesh(mesh, folder)
+    return Case(
+        folder=folder,
+        test=test,
+        craft=craft.name,
+        formulation=formulation,
+        domain=domain,
+        numerics=numerics,
+        line=None if test.motion.period == 0.0 else timeline(test, numerics.steps, numerics.ramp),
+        walls=tuple(patch.name for patch in mesh.patches if patch.kind == "wall"),
+        cells=mesh.cells,
+        label=label_of(mesh_settings),
+        mesh=_hash(mesh),
+        length=craft.length,
+        density=craft.water.density,
+        ranks=ranks,
+    )
 
 
 def label_of(settings: MeshSettings) -> str:
@@ -219,7 +224,7 @@ def context(case: Case, viscosity: float) -> dict[str, Any]:
     """Values of the templates. Viscosity [m2/s]."""
     numerics = case.numerics
     formulation = case.formulation
-    speed = _flow_speed(case)
+    speed = fastest(case.test, case.length)
     k = 1.5 * (numerics.intensity * speed) ** 2
     omega = k / (numerics.viscosity_ratio * viscosity)
     percent = 100.0 * numerics.intensity
@@ -257,13 +262,6 @@ def _vector(values: tuple[float, ...]) -> str:
 
 def _stream(formulation: Formulation) -> float:
     return 0.0 if isinstance(formulation, Arm | StillWater | Straight) else formulation.speed
-
-
-def _flow_speed(case: Case) -> float:
-    """Speed [m/s] that sets the turbulence of the far field: the fastest the water passes the origin."""
-    period = case.test.motion.period
-    nu = case.test.motion.history(np.linspace(0.0, period, 33) if period else np.array([0.0])).nu
-    return float(np.linalg.norm(nu[:, :3], axis=1).max())
 
 
 def _re_theta(percent: float) -> float:

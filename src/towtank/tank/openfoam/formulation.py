@@ -105,12 +105,19 @@ class Domain:
         )
 
 
-def formulation_of(test: CaptiveTest, domain: Domain) -> Formulation:
-    """The formulation that runs ``test``, chosen by its motion."""
+def fastest(test: CaptiveTest, length: float, carriage: float = 0.0) -> float:
+    """Largest speed [m/s] of a point of the hull in a period, in axes that move ahead at ``carriage`` [m/s]."""
+    period = test.motion.period
+    nu = test.motion.history(np.linspace(0.0, period, 65) if period else np.zeros(1)).nu
+    linear = np.linalg.norm(nu[:, :3] - [carriage, 0.0, 0.0], axis=1)
+    return float((linear + 0.5 * length * np.linalg.norm(nu[:, 4:], axis=1)).max())
+
+
+def formulation_of(test: CaptiveTest, domain: Domain, length: float) -> Formulation:
+    """The formulation that runs ``test`` on a hull of ``length`` [m], chosen by its motion."""
     motion = test.motion
     if motion.period > 0.0:
-        velocity = motion.history(np.linspace(0.0, motion.period, 65)).nu[:, :3]
-        swing = float(np.abs(velocity - [test.speed, 0.0, 0.0]).max())
+        swing = fastest(test, length, test.speed)
         return (StillWater if swing > test.speed else Moving)(test.speed)
     nu = motion.history(np.array([0.0])).nu[0]
     if nu[5] != 0.0:

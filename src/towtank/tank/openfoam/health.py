@@ -80,8 +80,8 @@ def health_of(case: Case, outcome: Outcome, loads: Array) -> Health:
         if case.steady
         else (),
         y_plus=y_plus(case.folder),
-        periods=0.0 if case.steady else period_difference(loads, case.test.samples),
-        residual=0.0 if case.steady else harmonic_residual(loads, case.test.samples),
+        periods=0.0 if case.steady else period_difference(loads, case.test.samples, case.length),
+        residual=0.0 if case.steady else harmonic_residual(loads, case.test.samples, case.length),
         start=case.start,
     )
 
@@ -99,6 +99,8 @@ def remarks(case: Case, health: Health) -> tuple[str, ...]:
         found.append("Euler in time: first order, damping and added mass mix; not for derivatives unless it must be")
     if health.courant_max > COURANT:
         found.append(f"Courant number {health.courant_max:.0f} above {COURANT:.0f}")
+    if not case.steady and np.isnan(health.periods):
+        found.append("fewer than two periods after the first: whether the wake has settled is not known")
     if health.periods > PERIODS:
         found.append(f"last two periods differ by {100 * health.periods:.1f} %, limit {100 * PERIODS:.0f} %")
     if health.residual > RESIDUAL:
@@ -134,27 +136,29 @@ def y_plus(folder: Path) -> dict[str, tuple[float, float, float]]:
     return out
 
 
-def _judged(loads: Array) -> NDArray[np.intp]:
-    """Columns of a force, or of a moment, whose variation is a fair share of the largest one's."""
+def _judged(loads: Array, length: float) -> NDArray[np.intp]:
+    """Columns whose variation is a fair share of what forces, or moments, of this size amount to."""
     size = loads.std(axis=0)
-    largest = np.repeat([size[:3].max(), size[3:].max()], 3)
-    return np.flatnonzero((size > SMALL * largest) & (size > 0.0))
+    return np.flatnonzero(size > SMALL * load_scale(size, length))
 
 
-def period_difference(loads: Array, samples: int) -> float:
-    """Largest root mean square difference of the last two periods, as a share of the load's standard deviation."""
-    if len(loads) < 2 * samples + 1:
-        return 0.0
+def period_difference(loads: Array, samples: int, length: float) -> float:
+    """Largest root mean square difference of the last two periods, as a share of the load's standard deviation.
+
+    NaN where fewer than two periods follow the first, which carries the start-up of the wake.
+    """
+    if len(loads) < 3 * samples + 1:
+        return float("nan")
     last, before = loads[-samples:], loads[-2 * samples : -samples]
-    columns = _judged(last)
+    columns = _judged(last, length)
     difference = np.sqrt(((last - before) ** 2).mean(axis=0))
     return float((difference[columns] / last.std(axis=0)[columns]).max(initial=0.0))
 
 
-def harmonic_residual(loads: Array, samples: int) -> float:
+def harmonic_residual(loads: Array, samples: int, length: float) -> float:
     """Largest share of a load's variation in the last period outside its mean and first three harmonics."""
     last = loads[-samples:]
-    columns = _judged(last)
+    columns = _judged(last, length)
     orders = np.fft.rfft(last, axis=0)
     orders[:4] = 0.0
     rest = np.fft.irfft(orders, n=len(last), axis=0)

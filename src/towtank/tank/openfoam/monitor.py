@@ -18,20 +18,22 @@ _ERROR = re.compile(r"FOAM FATAL (IO )?ERROR|FOAM exiting|Foam::sigFpe|\(core du
 KEPT_LINES = 40
 """Last lines kept for a message; a trace of OpenFOAM is about thirty."""
 
-MOMENT_SCALE = 0.1
-"""Judgement: a moment is flat against at least this share of the largest force times the length, since a moment that
-vanishes by symmetry has no size of its own; on a drifting hull moments reach the whole of it."""
+SHARED_SCALE = 0.1
+"""Judgement: a moment is judged against at least this share of the largest force times the length, and a force the
+other way round, since a load that vanishes by symmetry has no size of its own. On a drifting hull it is near one."""
 
 
 @dataclass
 class Log:
     """What a log has said so far. ``read`` takes it line by line.
 
+    unjudged : steps at the start whose Courant number is that of an impulsive start, and is not counted.
     steps : iterations or time steps ended.   time : the last one named.   cpu [s].   residuals : first one of each
     equation in the last step.   courant : (mean, max) of the last step; ``courant_max`` the largest of all.
     errors : lines that tell of a failure.   converged : SIMPLE met its residuals.
     """
 
+    unjudged: int = 0
     steps: int = 0
     time: float = 0.0
     cpu: float = 0.0
@@ -56,8 +58,8 @@ class Log:
             self._fresh.clear()
         elif found := _COURANT.match(line):
             self.courant = (_number(found[1]), _number(found[2]))
-            # Before the first step the solver states the Courant number of the field it starts from.
-            self.courant_max = max(self.courant_max, self.courant[1]) if self.steps else self.courant_max
+            if self.steps >= self.unjudged:
+                self.courant_max = max(self.courant_max, self.courant[1])
         elif found := _CLOCK.match(line):
             self.cpu = _number(found[1])
             self.steps += 1
@@ -98,8 +100,8 @@ def _number(text: str) -> float:
 def changes(loads: Array, window: int, length: float) -> Array:
     """Change of the mean load from the first to the last half of the ``window`` at the end, (6,), as a share.
 
-    loads (N, 6) : forces are compared with the largest mean force, moments with the largest mean moment or
-    ``MOMENT_SCALE`` of the largest force times ``length`` [m]. Infinite where the record is shorter or not finite.
+    loads (N, 6) are compared by ``load_scale`` on a hull of ``length`` [m]. Infinite where the record is shorter than
+    the window or not finite.
     """
     half = window // 2
     if len(loads) < 2 * half or not np.isfinite(loads[-2 * half :]).all():
@@ -109,10 +111,9 @@ def changes(loads: Array, window: int, length: float) -> Array:
 
 
 def load_scale(mean: Array, length: float) -> Array:
-    """What changes of a mean load (6,) are compared with: one number for forces, one for moments; never zero."""
-    force = float(np.abs(mean[:3]).max())
-    moment = max(float(np.abs(mean[3:]).max()), MOMENT_SCALE * force * length)
-    scale = np.repeat([force, moment], 3)
+    """What changes of a load (6,) are compared with: one number for forces, one for moments; never zero."""
+    force, moment = float(np.abs(mean[:3]).max()), float(np.abs(mean[3:]).max())
+    scale = np.repeat([max(force, SHARED_SCALE * moment / length), max(moment, SHARED_SCALE * force * length)], 3)
     return np.where(scale > 0.0, scale, np.inf)
 
 

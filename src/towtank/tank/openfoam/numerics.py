@@ -22,7 +22,8 @@ class Numerics:
 
     turbulence : a key of ``MODELS``.   wall : "functions", or "resolved" with the first cell inside the sublayer.
     steps : time steps in a period; raised to a multiple of the samples asked for, which then are steps.
-    ramp : periods before the recorded ones in which the motion swells smoothly from rest.
+    ramp : periods before the recorded ones in which the motion swells smoothly from rest. Multiples of a half begin
+    and end where the displacement passes zero, and are smooth by one derivative more.
     scheme : of time. Euler lags the load by up to a step: at 100 steps a period it moved Y'v by 42 %.
     outer, inner : PIMPLE loops, and pressure corrections in each.
     iterations : most iterations of a steady case.   flat : it stops when the mean load changes by less than this share

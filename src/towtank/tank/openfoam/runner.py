@@ -132,7 +132,8 @@ def _written(case: Case) -> list[Path]:
 
 
 def _prepared(case: Case, installation: Installation) -> Log:
-    """Cell zones and parts that the solver needs; a fresh log."""
+    """A fresh log, after the cell zones and parts were made that the solver needs."""
+    _drop_empty(case.folder / "postProcessing")
     control = case.folder / "system" / "controlDict"
     set_entry(control, "stopAt", "endTime")
     back = time.time() - MARGIN_OF_TIME
@@ -141,7 +142,16 @@ def _prepared(case: Case, installation: Installation) -> Log:
         _utility(case, installation, "topoSet")
     if case.ranks > 1 and not (case.folder / "processor0").is_dir():
         _utility(case, installation, "decomposePar")
-    return Log()
+    return Log(unjudged=0 if case.line is None else case.line.lead)
+
+
+def _drop_empty(place: Path) -> None:
+    """Remove files of loads without a row, which a solver leaves that dies before its first step."""
+    for path in place.glob("*/*/*.dat"):
+        with path.open(encoding="utf-8", errors="replace") as lines:
+            empty = all(line.startswith("#") for line in lines)
+        if empty:
+            path.unlink()
 
 
 def _utility(case: Case, installation: Installation, name: str, *options: str) -> None:
