@@ -18,8 +18,8 @@ from towtank.tank.openfoam.mesh.poly import Labels
 
 
 def ring_cells(around: int) -> int:
-    """Cells of the ring between core and rim: half the half-width of the core, at least two."""
-    return max(2, round(around / 8))
+    """Cells of the ring between core and rim: few, for a thick ring crowds the corners of the core."""
+    return max(1, round(around / 16))
 
 
 def cap_cells(around: int) -> int:

@@ -140,7 +140,7 @@ def mesh_lines(outline: Outline, s: Array, radial: Callable[[float, Array, Array
 def cap_limit(outline: Outline, end: int) -> float:
     """Longest arc [m] from the nose (end 0) or tail (end 1) over which the hull still opens like a disc.
 
-    The edge of a flat end; else where r/s has fallen to 0.6 of its value at the pole (judgement: further back a disc
+    The edge of a flat end; else where r/s has fallen to 0.35 of its value at the pole (judgement: further back a disc
     wraps around the shoulder and its cells are drawn out along the hull).
     """
     if outline.blunt[end]:
@@ -148,7 +148,7 @@ def cap_limit(outline: Outline, end: int) -> float:
     s, r = (outline.s, outline.r) if end == 0 else (outline.total - outline.s[::-1], outline.r[::-1])
     inner = s > 1e-4 * outline.total
     ratio = r[inner] / s[inner]
-    fallen = np.flatnonzero(ratio < 0.6 * np.maximum.accumulate(ratio))
+    fallen = np.flatnonzero(ratio < 0.35 * np.maximum.accumulate(ratio))
     return float(s[inner][fallen[0]]) if len(fallen) else 0.5 * outline.total
 
 
