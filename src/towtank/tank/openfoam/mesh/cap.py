@@ -29,10 +29,10 @@ def cap_cells(around: int) -> int:
 
 @dataclass(frozen=True)
 class Disc:
-    """Inner points (n, 2) of the unit disc, quads (q, 4), and the radii of the points on the way from pole to rim.
+    """Inner points (n, 2) of the unit disc and quads (q, 4).
 
     Labels from 0 to n - 1 are inner points; n + k is the rim point of plane k. Quads turn counter-clockwise, from
-    plane 0 towards plane 1.
+    plane 0 towards plane 1. ``spoke``: radii of the points from pole to rim along plane 0 when the rim is even.
     """
 
     points: Array
@@ -41,34 +41,38 @@ class Disc:
 
 
 def disc(rim: Array, half: bool) -> Disc:
-    """Disc with rim points at the angles ``rim`` (n,) [rad], ascending from 0, without the closing 2 pi.
+    """Disc with rim points at the angles ``rim`` (n,) [rad], ascending, without the closing 2 pi.
 
     n is a multiple of 8. ``half``: only the quads between planes 0 and n/2, whose points must be symmetric.
     """
     count = len(rim)
-    side, ring = count // 4, ring_cells(count // 2)
-    grid = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
-    shell = [_square_rim(grid)]
-    shell += [(side + 1) ** 2 + layer * count + np.arange(count) for layer in range(ring)]
-    inner = (side + 1) ** 2 + (ring - 1) * count
-    core = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
-    rings = [np.stack([a, b, np.roll(b, -1), np.roll(a, -1)], axis=1) for a, b in pairwise(shell)]
-    quads = np.concatenate([core, *rings])
-    points = _mean_of_neighbours(quads, inner, np.stack([np.cos(rim), np.sin(rim)], axis=1))
-    pole = grid[side // 2, side // 2]
-    points[pole] = 0.0 if np.hypot(*points[pole]) < 1e-9 else points[pole]
-    way = [grid[side // 2 + step, side // 2] for step in range(side // 2 + 1)] + [layer[0] for layer in shell[1:-1]]
-    spoke = np.r_[np.hypot(*points[way].T), 1.0]
+    quads, inner, way = _butterfly(count)
+    circle = np.stack([np.cos(rim), np.sin(rim)], axis=1)
+    points = _mean_of_neighbours(quads, inner, circle)
+    turn = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    even = _mean_of_neighbours(quads, inner, np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    spoke = np.r_[0.0, np.hypot(*even[way[1:]].T), 1.0]
+    points[np.abs(points) < 1e-9] = 0.0
     if not half:
         return Disc(points, quads, spoke)
-    points[np.abs(points[:, 1]) < 1e-9, 1] = 0.0
-    whole = np.concatenate([points, np.stack([np.cos(rim), np.sin(rim)], axis=1)])
-    upper = quads[whole[quads].mean(axis=1)[:, 1] > 0.0]
+    upper = quads[np.concatenate([points, circle])[quads].mean(axis=1)[:, 1] > 0.0]
     kept = np.unique(upper[upper < inner])
     label = np.full(inner + count, -1)
     label[kept] = np.arange(len(kept))
     label[inner:] = len(kept) + np.arange(count)
     return Disc(points[kept], label[upper], spoke)
+
+
+def _butterfly(count: int) -> tuple[Labels, int, Labels]:
+    """Quads of core and ring, number of inner points, and the inner points from pole to rim along plane 0."""
+    side, ring = count // 4, ring_cells(count // 2)
+    core = (side + 1) ** 2
+    grid = np.arange(core).reshape(side + 1, side + 1)
+    shells = [_square_rim(grid)] + [core + layer * count + np.arange(count) for layer in range(ring)]
+    square = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+    rings = [np.stack([a, b, np.roll(b, -1), np.roll(a, -1)], axis=1) for a, b in pairwise(shells)]
+    way = np.r_[grid[side // 2 :, side // 2], [shell[0] for shell in shells[1:-1]]].astype(int)
+    return np.concatenate([square, *rings]), core + (ring - 1) * count, way
 
 
 def _square_rim(grid: Labels) -> Labels:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towtank.craft.craft import Craft
-from towtank.errors import InputError
+from towtank.errors import InputError, TankError
 from towtank.frames import Array
 from towtank.tank.openfoam.mesh.cap import Disc, cap_cells, disc
 from towtank.tank.openfoam.mesh.fins import Layout, Planes, even_planes, layout, planes
 from towtank.tank.openfoam.mesh.meridian import Outline, cap_limit, mesh_lines, outline, smooth_map
 from towtank.tank.openfoam.mesh.poly import Labels, PolyMesh, assemble
+from towtank.tank.openfoam.mesh.quality import cell_volumes, face_vectors
 from towtank.tank.openfoam.mesh.spacing import first_cell, geometric, scaled
 from towtank.tank.openfoam.mesh.warp import TIP_SHARE, Window, radial_with_tip, warped
 
@@ -28,6 +29,8 @@ _LONGEST = 2.0
 """Longest cell along the hull over the mean one."""
 _EDGE_CELLS = (2.5, 3.0)
 """Cells at the leading and trailing edge of a fin over chord / along (judgement: 3 % of the chord on 80 along)."""
+_CLEAR = 0.2
+"""Chords between a fin's edge and a cap, over which the mesh turns back (judgement: less folds it at 20 deg)."""
 _FEWEST_ON_CHORD = 6
 _FEWEST = (8, 6)
 """Fewest cells around and out."""
@@ -106,6 +109,8 @@ def mesh_of(
     ------
     InputError
         Too few cells, fins that do not fit, a half domain of a craft without that symmetry.
+    TankError
+        The mesh folds.
     """
     along, around, out = settings.counts()
     shape = outline(craft.profile, settings.far * craft.length)
@@ -134,7 +139,14 @@ def mesh_of(
         blocks.append(block)
     points = np.concatenate(cloud)
     points[:, 0] = craft.origin_from_nose - points[:, 0]
-    return _joined(points, blocks, half)
+    mesh = _joined(points, blocks, half)
+    _, volume = cell_volumes(mesh, *face_vectors(mesh))
+    if np.any(volume <= 0.0):
+        raise TankError(
+            f"the mesh of {craft.name!r} folds: {np.count_nonzero(volume <= 0.0)} of its cells have no volume. "
+            "Turn the fins less, move them off the tail, or change along, around and out."
+        )
+    return mesh
 
 
 def _geometric(wall: float, out: int) -> Radial:
@@ -169,10 +181,10 @@ def _stations(shape: Outline, along: int, around: int, found: Layout | None) -> 
         reach[end] = min(reach[end], cap_limit(shape, end))
         if found and not shape.blunt[end]:
             reach[end] = min(reach[end], 0.5 * free[end])
-        if found and free[end] - reach[end] < 0.1 * found.chord:
+        if found and free[end] - reach[end] < _CLEAR * found.chord:
             raise InputError(
-                f"the fins end {free[end]:.3g} m from the {('nose', 'tail')[end]} along the hull, less than a tenth of "
-                "their chord ahead of the cells of the end. Move them or shorten root_chord."
+                f"the fins end {free[end]:.3g} m from the {('nose', 'tail')[end]} along the hull, less than "
+                f"{_CLEAR:g} chords from the cells of that end. Move them or shorten root_chord."
             )
     fixed = [reach[0], total - reach[1]]
     cells_at = [ends, along - ends]
