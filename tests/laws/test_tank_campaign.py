@@ -122,8 +122,8 @@ def test_a_broken_file_is_run_again_and_said_so(tmp_path, share):
     tow(PLAN, tank, tmp_path, spy)
     assert tank.ran == [NAMES[2]]
     notes = [note for what, note in spy.told if what == "step"]
-    assert "run again" in notes[2]
-    assert "on file" in notes[3]
+    assert ["run again" in note for note in notes].count(True) == 1
+    assert ["on file" in note for note in notes].count(True) == len(NAMES) - 1
     assert status(PLAN, CountingTank(), tmp_path).done == NAMES
 
 

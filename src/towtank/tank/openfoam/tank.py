@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from towtank.craft.craft import Craft
-from towtank.errors import ArtefactError, InputError
+from towtank.errors import ArtefactError, InputError, TankError
 from towtank.plan.kinds import CaptiveTest
 from towtank.progress import Progress
 from towtank.tank.identity import run_id
@@ -24,6 +25,8 @@ from towtank.tank.openfoam.mesh.grid import MeshSettings
 from towtank.tank.openfoam.numerics import Numerics
 from towtank.tank.openfoam.read import run_of
 from towtank.tank.openfoam.runner import solve
+from towtank.tank.openfoam.schedule import schedule
+from towtank.tank.pool import Schedule
 from towtank.tank.run import Run
 
 LEVEL = "rans"
@@ -50,6 +53,7 @@ class OpenFoamTank:
     mesh, numerics : settings in place of the preset's.
     where : study folder; cases lie in ``runs/<id>/case``. Without it they are made in a temporary folder and removed.
     from_neighbour : straight runs start from the nearest one that is solved on the same mesh, where there is one.
+    stop : when it is set, the run under way ends; its files stay.
     """
 
     quality: str = "draft"
@@ -60,6 +64,7 @@ class OpenFoamTank:
     numerics: Numerics | None = None
     where: Path | None = None
     from_neighbour: bool = True
+    stop: threading.Event | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.quality not in PRESETS:
@@ -105,6 +110,14 @@ class OpenFoamTank:
         """The same tank with its cases in the folder ``study``."""
         return self if self.where is not None else replace(self, where=study)
 
+    def ended_by(self, stop: threading.Event) -> OpenFoamTank:
+        """The same tank, whose runs end when ``stop`` is set."""
+        return replace(self, stop=stop)
+
+    def schedule(self, craft: Craft, tests: Sequence[CaptiveTest]) -> Schedule:
+        """Order of a campaign in this tank: straight runs go on from their neighbours."""
+        return schedule(craft, tests, self.mesh_settings, self.solution)
+
     def run(self, craft: Craft, test: CaptiveTest, progress: Progress) -> Run:
         """Run one captive test: write its case, or go on with the one on file, solve and read it.
 
@@ -116,7 +129,7 @@ class OpenFoamTank:
         installation = require()
         with self._folder(craft, test) as folder:
             case = self._case(folder, craft, test)
-            case, outcome = solve(case, installation, progress)
+            case, outcome = solve(case, installation, progress, stop=self.stop)
             return run_of(case, craft, test, self, outcome)
 
     @contextmanager
@@ -135,7 +148,12 @@ class OpenFoamTank:
             except ArtefactError:
                 shutil.rmtree(folder)
         start = self._neighbour(craft, test) if self.from_neighbour else None
-        return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, start)
+        if start is not None:
+            try:
+                return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, start)
+            except TankError:  # solved on another mesh, or its fields are gone: the uniform flow serves
+                pass
+        return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores)
 
     def _neighbour(self, craft: Craft, test: CaptiveTest) -> Path | None:
         """The solved straight case of the same mesh whose inflow is nearest."""
