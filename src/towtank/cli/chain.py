@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from towtank.cli import fitting
+from towtank.cli import fitting, towing
 from towtank.cli.reply import Remarks, Reply
 from towtank.cli.scatter import asked, spread
 from towtank.cli.study import Study, file_hash, program_hash
@@ -71,6 +71,8 @@ class Chain:
 
     drawing : what the user asked of the Monte Carlo study, as in ``cli.scatter.DRAWING``; None: what the study has.
     fitting : what the user asked of the fit, as in ``cli.fitting.FITTING``; None: what the study has.
+    towing : what the user asked of the tank, as in ``cli.towing.TOWING``; None: what the study has.
+    jobs : runs under way at a time; None: as many as the tank makes use of.
     """
 
     study: Study
@@ -80,6 +82,8 @@ class Chain:
     speed: str | None = None
     drawing: dict[str, str] | None = None
     fitting: dict[str, str] | None = None
+    towing: dict[str, str] | None = None
+    jobs: int | None = None
     wall: dict[str, float] = field(default_factory=dict)
     _runs: tuple[Run, ...] | None = None
     _told: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -93,9 +97,7 @@ class Chain:
 
     def tank(self) -> Tank:
         """The tank the campaign runs in."""
-        from towtank.tank.fast.tank import FastTank
-
-        return FastTank()
+        return towing.tank(self)
 
     def inputs(self, stage: str) -> dict[str, str]:
         """Name -> hash of what ``stage`` depends on, as things stand."""
@@ -107,7 +109,7 @@ class Chain:
             case "plan":
                 return craft | {"speed": self.speed or ""}
             case "tow":
-                return craft | {"plan": file_hash(study.plan), "tank": digest(self.tank().settings(), 16)}
+                return craft | {"plan": file_hash(study.plan)} | towing.inputs(self)
             case "derive":
                 return craft | {"runs": files.get("tow", "")} | fitting.inputs(self)
             case "trials":
@@ -212,6 +214,7 @@ class Chain:
     def tow(self) -> None:
         """Run the captive tests that are not done yet."""
         self.reply.kept = f"Finished runs are kept in {self.study.runs}."
+        towing.keep(self)
         self.do("tow", self._tow)
         self.reply.file("runs", self.study.runs)
         self.reply.kept = f"What is done is kept in {self.study.root}."
@@ -231,7 +234,8 @@ class Chain:
 
         if self._runs is None:
             if self.study.plan.exists():
-                self._runs = tow(self.plan(), self.tank(), self.study.root, Remarks(self.reply))
+                told, jobs = Remarks(self.reply), towing.jobs(self)
+                self._runs = tow(towing.plan(self), self.tank(), self.study.root, told, jobs=jobs)
             elif self.study.runs.is_dir():
                 self._runs = tuple(read_runs(self.study.runs))
             else:

@@ -84,7 +84,7 @@ class Reply:
 
 @dataclass(frozen=True)
 class Remarks:
-    """Progress of a campaign: forwards to the bars, and says which runs had to be made again."""
+    """Progress of a campaign: forwards to the bars, and says which runs had to be made again and which failed."""
 
     reply: Reply
 
@@ -93,8 +93,8 @@ class Remarks:
         self.reply.progress.start(task, total)
 
     def step(self, task: str, note: str = "") -> None:
-        """Forward; a run that is made again is told on its own line."""
-        if ": run again, " in note:
+        """Forward; a run that is made again, or failed, is told on its own line."""
+        if ": run again, " in note or ": failed, " in note:
             self.reply.log(f"  {note}")
         self.reply.progress.step(task, note.partition(":")[0])
 

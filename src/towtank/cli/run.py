@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from towtank.cli import towing
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, Speed, StudyArgument
 from towtank.cli.reply import answering
@@ -21,19 +22,33 @@ UNCOMPILED = (
 
 
 def run(
-    craft: StudyArgument = None, speed: Speed = None, out: Out = None, json: Json = False, debug: Debug = False
+    craft: StudyArgument = None,
+    speed: Speed = None,
+    tank: towing.TankName = None,
+    quality: towing.Quality = None,
+    turbulence: towing.Turbulence = None,
+    refinement: towing.Refinement = None,
+    only: towing.Only = None,
+    jobs: towing.Jobs = None,
+    out: Out = None,
+    json: Json = False,
+    debug: Debug = False,
 ) -> None:
     """Do the whole chain, from craft file to report.
 
     Captive tests, derivatives, model, trials with their uncertainty, verdict and report go into the study folder.
-    Stages that are done with the same inputs are not repeated; after Ctrl-C the same command resumes.
+    Stages that are done with the same inputs are not repeated; after Ctrl-C the same command resumes. The tank and what
+    is asked of it are kept for the next time.
 
     Example: towtank run hokie
+
+    Example: towtank run hokie --tank openfoam --out hokie-rans
     """
     with answering("run", json, debug) as reply:
         if cores() > 1:
             prepare(*PRELOADED)
         chain = open_chain(reply, craft, out, speed)
+        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs)
         chain.prepare()
         chain.make_plan()
         chain.tow()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+from towtank.cli import towing
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
 from towtank.cli.reply import answering
@@ -12,15 +13,30 @@ SHOWN = 8
 """Remarks listed; the rest is counted."""
 
 
-def tow(craft: StudyArgument = None, out: Out = None, json: Json = False, debug: Debug = False) -> None:
+def tow(
+    craft: StudyArgument = None,
+    tank: towing.TankName = None,
+    quality: towing.Quality = None,
+    turbulence: towing.Turbulence = None,
+    refinement: towing.Refinement = None,
+    only: towing.Only = None,
+    jobs: towing.Jobs = None,
+    out: Out = None,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
     """Run the captive tests that are not done yet.
 
-    Makes the standard plan when the study has none.
+    Makes the standard plan when the study has none. The tank and what is asked of it are kept for the next time. A run
+    that fails leaves the others to go on; asked again, the same command tries it alone.
 
     Example: towtank tow hokie
+
+    Example: towtank tow hokie --tank openfoam --only drift,sway --out hokie-rans
     """
     with answering("tow", json, debug) as reply:
         chain = open_chain(reply, craft, out).keep_speed()
+        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs)
         chain.prepare()
         chain.make_plan()
         chain.tow()

@@ -97,7 +97,7 @@ def tow_one(plan: Plan, identity: str, tank: Tank, out: Path, progress: Progress
             )
         name = known[identity].name
         with contextlib.suppress(ArtefactError):
-            if (stored := _stored(known[identity], identity, out)) is not None:
+            if (stored := stored_run(known[identity], identity, out)) is not None:
                 return stored
         run = _placed(tank, out).run(plan.craft, known[identity], Silent() if progress is None else progress)
         write_run(replace(run, id=identity), run_path(out, identity))
@@ -137,7 +137,7 @@ class _Campaign:
         remarks: dict[int, str] = {}
         for number, (test, identity) in enumerate(zip(self.plan.tests, self.ids, strict=True)):
             try:
-                stored = None if self.folder is None else _stored(test, identity, self.folder)
+                stored = None if self.folder is None else stored_run(test, identity, self.folder)
             except ArtefactError as error:
                 stored, remarks[number] = None, f"{test.name}: run again, {error}"
             if stored is None:
@@ -192,7 +192,7 @@ def status(plan: Plan, tank: Tank | None = None, out: Path | str = ".") -> Campa
     found: dict[str, list[str]] = {"done": [], "to_do": [], "broken": []}
     for test, identity in zip(plan.tests, run_ids(plan, _fast_tank() if tank is None else tank), strict=True):
         try:
-            state = "to_do" if _stored(test, identity, Path(out)) is None else "done"
+            state = "to_do" if stored_run(test, identity, Path(out)) is None else "done"
         except ArtefactError:
             state = "broken"
         found[state].append(test.name)
@@ -225,7 +225,7 @@ def _writable(folder: Path) -> Path:
         ) from error
 
 
-def _stored(test: CaptiveTest, identity: str, folder: Path) -> Run | None:
+def stored_run(test: CaptiveTest, identity: str, folder: Path) -> Run | None:
     """The whole run on file, or None when there is no file.
 
     Raises

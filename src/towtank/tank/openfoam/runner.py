@@ -28,6 +28,9 @@ from towtank.tank.openfoam.formulation import Arm
 from towtank.tank.openfoam.monitor import Log, changes, flat
 
 SCHEMA = "towtank/case-outcome/1"
+LOCK = ".lock"
+"""In the folder of a case; held while it is run."""
+
 CHECK_EVERY = 10
 """Iterations between two looks at the load; a look takes some milliseconds."""
 
@@ -109,7 +112,7 @@ def _read_outcome(path: Path) -> Outcome:
 def _alone(folder: Path) -> Iterator[int]:
     """Hold the lock of the case; the solver holds it too, so that an orphan is noticed."""
     try:
-        handle = (folder / ".lock").open("a")
+        handle = (folder / LOCK).open("a")
     except OSError as error:
         raise TankError(
             f"cannot write {folder}: {error.strerror}. Free some space, or choose another folder."
