@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +14,6 @@ import pytest
 from towtank.cluster.work import each_once
 from towtank.errors import InputError
 
-SCRIPT = Path(__file__).parents[2] / "validation" / "slurm_loopback.sh"
 ITEMS = list(range(40))
 KEYS = [f"item-{item}" for item in ITEMS]
 
@@ -36,26 +31,6 @@ def _settings(folder: Path) -> dict[str, Any]:
         "job_script_prologue": [f"export PYTHONPATH={Path(__file__).parent}"],
         "python": sys.executable,
     }
-
-
-@pytest.fixture(scope="module")
-def slurm() -> Iterator[Path]:
-    absent = [name for name in ("slurmctld", "slurmd", "sbatch", "munged") if not shutil.which(name)]
-    assert not absent, f"not installed: {absent}. apt-get install slurmctld slurmd slurm-client munge"
-    assert os.geteuid() == 0, "the daemons of a one-node Slurm need root"
-    # The daemons write a last line to their logs while they end.
-    with (
-        tempfile.TemporaryDirectory(prefix="slurm-", ignore_cleanup_errors=True) as folder,
-        pytest.MonkeyPatch.context() as patch,
-    ):
-        patch.setenv("SLURM_CONF", f"{folder}/slurm.conf")
-        try:
-            subprocess.run(["sh", str(SCRIPT), "start", folder], check=True, timeout=60)
-            yield Path(folder)
-        finally:
-            subprocess.run(["scancel", "--user=root"], check=False, timeout=20)
-            time.sleep(2.0)
-            subprocess.run(["sh", str(SCRIPT), "stop", folder], check=False, timeout=60)
 
 
 def _jobs() -> list[str]:

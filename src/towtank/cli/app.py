@@ -18,6 +18,7 @@ from towtank.cli.new import new
 from towtank.cli.plan import plan
 from towtank.cli.report import report
 from towtank.cli.run import run
+from towtank.cli.solve_case import solve_case
 from towtank.cli.status import status
 from towtank.cli.sweep import sweep
 from towtank.cli.tow import tow
@@ -70,3 +71,4 @@ for _command in (
     doctor,
 ):
     app.command(_command.__name__.strip("_").replace("_", "-"))(_command)
+app.command("solve-case", hidden=True)(solve_case)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import fnmatch
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from towtank.cli.reply import Remarks
 from towtank.errors import InputError
 from towtank.parallel import cores
 from towtank.provenance import digest
@@ -161,6 +163,45 @@ def _meant(word: str, test: CaptiveTest) -> bool:
 
 def standings(chain: Chain) -> Standings:
     """How far each run of a campaign in OpenFOAM is."""
+    from towtank.tank.openfoam.slurm import queue
     from towtank.tank.openfoam.standing import standings as of_plan
 
-    return of_plan(plan(chain), openfoam(chain), chain.study.root)
+    return of_plan(plan(chain), openfoam(chain), chain.study.root, queue(chain.study.root))
+
+
+def elsewhere(chain: Chain, settings: Path | None) -> None:
+    """Have the missing runs made by Slurm, as the file ``settings`` says; without one, see that Slurm has none.
+
+    Raises
+    ------
+    InputError
+        The tank is the fast one, the settings cannot be used, or runs are in the queue and it is not asked for.
+    """
+    from towtank.tank.openfoam.slurm import queue, read_settings
+
+    root = chain.study.root
+    if settings is None:
+        if queued := queue(root):
+            raise InputError(
+                f"{len(queued)} runs of {root} are in the queue of Slurm. Follow them with --slurm SETTINGS, or end "
+                "them with --cancel."
+            )
+        return
+    if asked(chain)["tank"] != "openfoam":
+        raise InputError("--slurm is for --tank openfoam; the fast tank takes seconds here. Leave it out.")
+    from towtank.tank.openfoam.follow import follow
+
+    read = read_settings(settings)
+    keep(chain)
+    chain.reply.kept = f"Finished runs are kept in {chain.study.runs}."
+    for number in follow(plan(chain), openfoam(chain), root, read, Remarks(chain.reply)):
+        chain.reply.log(f"tow      runs came from job array {number:03d} in {root / 'slurm'}")
+
+
+def cancel(chain: Chain) -> None:
+    """Cancel what Slurm has of the study, and say what it was."""
+    from towtank.tank.openfoam.slurm import cancel as cancel_tasks
+
+    found = cancel_tasks(chain.study.root)
+    chain.reply.summary["cancelled"] = [task.run for task in found]
+    chain.reply.say(f"{len(found)} runs cancelled. What is on file stays; the same command without --cancel goes on.")

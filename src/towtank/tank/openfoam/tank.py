@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -149,10 +149,8 @@ class OpenFoamTank:
                 shutil.rmtree(folder)
         start = self._neighbour(craft, test) if self.from_neighbour else None
         if start is not None:
-            try:
+            with suppress(TankError):  # solved on another mesh, or its fields are gone: the uniform flow serves
                 return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, start)
-            except TankError:  # solved on another mesh, or its fields are gone: the uniform flow serves
-                pass
         return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores)
 
     def _neighbour(self, craft: Craft, test: CaptiveTest) -> Path | None:
