@@ -87,14 +87,14 @@ def keep(now):
     (case / f"{{now:.12g}}" / "p").write_text("internalField uniform 0; boundaryField {{ }}")
 def one(number):
     now = number * step
-    for file, value in ((force, 100.0 + 50.0 * 0.8**number), (moment, 20.0)):
+    for file, value in ((force, swollen * (100.0 + 50.0 * 0.8**number)), (moment, 20.0)):
         file.write(f"{{now:.12g}} ({{-value}} {{value}} 0)\\n"); file.flush()
     print(f"Time = {{now:.12g}}\\n")
     print("GAMG:  Solving for p, Initial residual = 0.01, Final residual = 1e-4, No Iterations 3")
     print(f"ExecutionTime = {{0.01 * number}} s  ClockTime = 0 s\\n", flush=True)
     time.sleep(0.002)
     return now
-number = round(start / step)
+number, swollen = round(start / step), 1.0
 print("trapFpe: Floating point exception trapping enabled (FOAM_SIGFPE).")
 {behaviour}
 while number * step < end - 0.5 * step:

@@ -182,6 +182,23 @@ def test_a_diverged_motion_is_tried_with_half_the_step_and_then_with_euler(sway,
     assert read_case(case.folder) == case
 
 
+def test_a_killed_motion_keeps_its_step(sway, tmp_path):
+    with pytest.raises(TankError, match="killed"):
+        solve(sway, stand_in(tmp_path, "os.kill(os.getpid(), signal.SIGKILL)"), Silent())
+    assert read_case(sway.folder) == sway
+
+
+@pytest.mark.parametrize(
+    "said",
+    ["print('Courant Number mean: 1e3 max: 1e60', flush=True); one(1)", "swollen = 1e30"],
+    ids=["Courant", "load"],
+)
+def test_numbers_beyond_any_solution_end_a_solver_that_does_not_end_itself(sway, tmp_path, said):
+    endless = f"{said}\nend = 1e9\nsignal.signal(signal.SIGPIPE, signal.SIG_DFL)\n"
+    with pytest.raises(TankError, match="beyond any solution"):
+        solve(sway, stand_in(tmp_path, endless), Silent())
+
+
 def test_a_motion_that_diverges_at_every_try_says_so(sway, tmp_path):
     with pytest.raises(TankError, match=r"diverged.*No gentler setting"):
         solve(sway, stand_in(tmp_path, "os.kill(os.getpid(), 8)"), Silent())

@@ -35,8 +35,8 @@ def _primes(load):
 
 def test_a_coarse_drift_point_is_near_that_of_a_finer_mesh(drift):
     found = _primes(drift.loads[0])
-    # The moment is of potential flow and hardly depends on the mesh. Drag and side force come from the boundary layer at
-    # the stern, which 12 cells around and 22 out do not resolve: an eighth and a fifth are what they cost.
+    # The moment is of potential flow and hardly depends on the mesh. Drag and side force come from the boundary layer
+    # at the stern, which 12 cells around and 22 out do not resolve: an eighth and a fifth are what they cost.
     for at, tolerance in ((0, 0.16), (1, 0.22), (5, 0.03)):
         assert found[at] == pytest.approx(STORED["primes"]["XYZKMN"[at]], rel=tolerance)
     assert found[[2, 3, 4]] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
@@ -55,7 +55,7 @@ def test_a_drift_point_ends_by_its_flat_load_in_good_health(drift):
 
 
 def test_a_drift_angle_held_by_moving_the_mesh_is_steady_drift(drift):
-    """Frames: the mesh turns by the angle and moves aside in a stream; loads in space turned back are those of drift."""
+    """The mesh turns by the angle and moves aside in a stream; loads in space, turned back, are those of drift."""
     test = CaptiveTest("held", U, Held(U, BETA, 0.3, 2.0), periods=1, samples=16)
     tank = OpenFoamTank(mesh=COARSE, numerics=Numerics(steps=48, ramp=1.0))
     moved = tank.run(CRAFT, test, Silent())

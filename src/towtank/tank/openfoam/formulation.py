@@ -113,6 +113,17 @@ def fastest(test: CaptiveTest, length: float, carriage: float = 0.0) -> float:
     return float((linear + 0.5 * length * np.linalg.norm(nu[:, 4:], axis=1)).max())
 
 
+def load_limit(test: CaptiveTest, length: float, density: float) -> float:
+    """Force [N] that no solution of ``test`` reaches: 2 in primes of speed and acceleration, where hulls have 0.01.
+
+    length [m], density [kg/m3] : beyond it the solution is lost, even where no floating-point trap was sprung.
+    """
+    period = test.motion.period
+    nudot = test.motion.history(np.linspace(0.0, period, 65) if period else np.zeros(1)).nudot
+    acceleration = np.linalg.norm(nudot[:, :3], axis=1) + 0.5 * length * np.linalg.norm(nudot[:, 4:], axis=1)
+    return density * length**2 * (fastest(test, length) ** 2 + length * float(acceleration.max()))
+
+
 def formulation_of(test: CaptiveTest, domain: Domain, length: float) -> Formulation:
     """The formulation that runs ``test`` on a hull of ``length`` [m], chosen by its motion."""
     motion = test.motion

@@ -18,6 +18,9 @@ _ERROR = re.compile(r"FOAM FATAL (IO )?ERROR|FOAM exiting|Foam::sigFpe|\(core du
 KEPT_LINES = 40
 """Last lines kept for a message; a trace of OpenFOAM is about thirty."""
 
+ABSURD_COURANT = 1e4
+"""Judgement: runs held up to 61 and started at 100; one that passes this is on its way to infinity."""
+
 SHARED_SCALE = 0.1
 """Judgement: a moment is judged against at least this share of the largest force times the length, and a force the
 other way round, since a load that vanishes by symmetry has no size of its own. On a drifting hull it is near one."""
@@ -76,6 +79,11 @@ class Log:
         if not self.residuals:
             return "", 0.0
         return max(self.residuals.items(), key=lambda item: item[1])
+
+    @property
+    def lost(self) -> bool:
+        """True when the Courant number tells that nothing of the solution is left, though no trap was sprung."""
+        return self.steps > 0 and not self.courant[1] < ABSURD_COURANT
 
     @property
     def broken_file(self) -> bool:

@@ -15,6 +15,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
+
 from towtank.artefact import read_json, write_json
 from towtank.errors import InputError, TankError
 from towtank.progress import Progress
@@ -24,7 +26,7 @@ from towtank.tank.imported.openfoam import read_forces
 from towtank.tank.openfoam.case import MARGIN_OF_TIME, Case, write_document, write_motion
 from towtank.tank.openfoam.dictionary import set_entry, times
 from towtank.tank.openfoam.find import Installation
-from towtank.tank.openfoam.formulation import Arm
+from towtank.tank.openfoam.formulation import Arm, load_limit
 from towtank.tank.openfoam.monitor import Log, changes, flat
 
 SCHEMA = "towtank/case-outcome/1"
@@ -36,6 +38,9 @@ CHECK_EVERY = 10
 
 BROKEN_TIMES = 2
 """Damaged times on file that are dropped in turn; as many as are kept."""
+
+DIVERGED = "diverged"
+"""What the log is said to hold when numbers, not the solver, tell of the end."""
 
 PATIENCE = 5.0
 """Seconds a solver is given to end by itself before it is killed."""
@@ -92,8 +97,8 @@ def solve(
                 broken += 1
                 retries = (*retries, _drop_last(case))
                 continue
-            changed = _next_rung(case)
-            if changed is None or log.broken_file:
+            changed = _next_rung(case) if _diverged(log, code) else None
+            if changed is None:
                 raise TankError(_failure(case, log, code))
             case, words = changed
             retries = (*retries, words)
@@ -239,9 +244,20 @@ def _follow(case: Case, process: subprocess.Popen[str], out: IO[str], progress: 
         if not log.read(line):
             continue
         progress.step(task, log.note())
+        if log.lost or (log.steps % CHECK_EVERY == 0 and _beyond(case)):
+            log.errors.append(DIVERGED)
+            _end(process)
+            return
         if case.steady and not told and log.steps % CHECK_EVERY == 0 and _settled(case):
             set_entry(case.folder / "system" / "controlDict", "stopAt", "writeNow")
             told = True
+
+
+def _beyond(case: Case) -> bool:
+    """True when the last load is one that no solution has."""
+    loads = measured(case)
+    limit = load_limit(case.test, case.length, case.density)
+    return loads is not None and not bool((np.abs(loads[-1, 1:4]) < limit).all())
 
 
 def _settled(case: Case) -> bool:
@@ -348,15 +364,24 @@ def _outcome(case: Case, log: Log, wall: float, retries: tuple[str, ...], resume
     return Outcome(ended, log.steps, log.cpu, wall, dict(log.residuals), log.courant_max, change, retries, resumed)
 
 
+def _diverged(log: Log, code: int) -> bool:
+    return code == 128 + signal.SIGFPE or any("sigFpe" in line or line == DIVERGED for line in log.errors)
+
+
 def _failure(case: Case, log: Log, code: int) -> str:
     where = f"{case.folder}: {case.application} ended with code {code} at step {log.time:g}"
-    if code == 128 + signal.SIGFPE or any("sigFpe" in line for line in log.errors):
+    if _diverged(log, code):
         remedy = (
             "Look at the mesh quality first; then try a finer first field, a smaller refinement or smaller relaxation."
             if case.steady
             else "No gentler setting is left; try more steps a period or a smaller amplitude."
         )
-        return f"{where}: the solution diverged (floating-point exception). {remedy}"
+        how = (
+            "its Courant number or load is beyond any solution"
+            if DIVERGED in log.errors
+            else "floating-point exception"
+        )
+        return f"{where}: the solution diverged ({how}). {remedy}"
     if code in (128 + signal.SIGKILL, 128 + signal.SIGTERM):
         return f"{where}: it was killed, as by a full memory. What is on file stays; ask again to go on from there."
     if log.broken_file:
