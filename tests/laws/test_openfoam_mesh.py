@@ -89,10 +89,9 @@ def test_wetted_area_of_fins_approaches_that_of_the_craft():
     for r in (1.0, 1.75):
         mesh = mesh_of(X, MeshSettings(along=64, around=16, out=24, refinement=r), half=True, fins=np.zeros(4))
         short.append(1.0 - patch_area(mesh, "fin3") / exact)
-    # A square tip is 6 % of the area of this thick section; the mesh rounds it within the planform and keeps half.
-    # The nose, drawn by few chords, costs another percent.
-    assert 0.0 < short[1] < short[0] < 0.06
-    assert short[1] < 0.04
+    # A square tip is 6 % of the area of this thick section; the mesh closes it to an edge, 4.5 % less in the limit.
+    # The nose, drawn by few chords, costs what is left.
+    assert 0.0 < short[1] < short[0] < 0.055
 
 
 @pytest.mark.parametrize("name", ["suboff-bare", "suboff-fins", "suboff-x", "remus100"])

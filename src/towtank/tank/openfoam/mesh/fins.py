@@ -240,7 +240,7 @@ def fin_surface(
     nose = 0.5 * float(half_thickness(fin.thickness, 1e-8)) * 1e4 * np.tan(angle)
 
     def point(y: Array, f: Array) -> tuple[Array, Array]:
-        round_tip = np.sqrt(1.0 - np.clip((y - fin.tip_radius + rounding) / rounding, 0.0, 1.0) ** 2)
+        round_tip = 1.0 - np.clip((y - fin.tip_radius + rounding) / rounding, 0.0, 1.0) ** 2
         part = nose * round_tip
         t = part + (side - part) * np.sqrt(f)
         offset = np.sign(t) * half_thickness(fin.thickness, t**2) * fin.chord(y) * round_tip

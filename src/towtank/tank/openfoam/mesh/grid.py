@@ -243,8 +243,8 @@ def _body(
 
 
 def _rounding(found: Layout) -> float:
-    """Half the thickness of the thickest tip [m]: an edge rounded by a half circle."""
-    return max(0.5 * fin.thickness * fin.tip_chord for fin in found.fins)
+    """Thickness of the thickest tip [m]: a parabola over it closes the edge at no more than 45 deg."""
+    return max(fin.thickness * fin.tip_chord for fin in found.fins)
 
 
 def _turned(meridian: Array, theta: Array) -> Array:
