@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,9 +16,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+import towtank.tank.openfoam.find
 import towtank.tank.openfoam.tank
 from towtank.cli.app import app
 from towtank.errors import TankError
+from towtank.report.study import read_study
 from towtank.tank.files import read_runs
 
 OFTEN = "import towtank.tank.openfoam.case as case; case.WRITE_EVERY = 20; from towtank.cli import main; main()"
@@ -219,6 +222,24 @@ def test_what_the_tank_cannot_do_is_bad_input_with_the_remedy(tmp_path: Path, wo
     assert result.exit_code == 2, result.stderr
     assert told in result.stderr
     assert not list(tmp_path.glob("study/runs/*"))
+
+
+def test_without_openfoam_the_remedy_is_told_and_no_run_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(towtank.tank.openfoam.find, "find", lambda environ=None: None)
+    result = _invoke("tow", CRAFT, *ASKED, "--out", str(tmp_path / "study"))
+    assert result.exit_code == 3
+    assert "apt-get install" in result.stderr
+    assert not list(tmp_path.glob("study/runs/*"))
+
+
+def test_the_report_of_a_campaign_does_not_show_runs_of_another_tank(tmp_path: Path, towed: Path):
+    study = tmp_path / "study"
+    shutil.copytree(towed, study)
+    assert _invoke("tow", "--tank", "fast", "--only", "drift", "--out", str(study)).exit_code == 0
+    assert {run.level for run in read_study(study).runs} == {"semi-empirical"}
+    assert _invoke("tow", *ASKED, "--out", str(study)).exit_code == 0
+    runs = read_study(study).runs
+    assert ({run.level for run in runs}, len(runs)) == ({"rans"}, 3)
 
 
 def test_only_some_tests_of_the_fast_tank_and_all_of_them_again(tmp_path: Path):

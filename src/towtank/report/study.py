@@ -219,7 +219,7 @@ def read_study(folder: Path | str) -> Study:
     study = Study(
         craft=craft,
         plan=plan,
-        runs=_in_plan(plan, _runs(files["runs"], attempt)),
+        runs=_in_plan(plan, _runs(root, attempt)),
         derivatives=attempt(
             "derivatives", files["derivatives.json"], lambda: read_derivatives(files["derivatives.json"])
         ),
@@ -237,16 +237,32 @@ def read_study(folder: Path | str) -> Study:
     return completed(replace(study, problems=tuple(problems)))
 
 
-def _runs(folder: Path, attempt: Callable[..., Any]) -> tuple[Run, ...]:
-    """Every whole run; of two with one name the file written last. A broken one becomes a problem."""
+def _runs(root: Path, attempt: Callable[..., Any]) -> tuple[Run, ...]:
+    """Every whole run of the campaign; of two with one name the file written last. A broken one becomes a problem.
+
+    A folder may hold runs of other tanks and settings, which the campaign recorded last does not count.
+    """
     from towtank.tank.files import read_run
 
     latest: dict[str, Run] = {}
-    for path in sorted(folder.glob("*/run.nc"), key=lambda path: path.stat().st_mtime):
+    recorded = _recorded(root)
+    found = (path for path in root.glob("runs/*/run.nc") if not recorded or path.parent.name in recorded)
+    for path in sorted(found, key=lambda path: path.stat().st_mtime):
         run = attempt("runs", path, partial(read_run, path))
         if run is not None:
             latest[run.name] = run
     return tuple(latest.values())
+
+
+def _recorded(root: Path) -> set[str]:
+    """Folder names of the runs that the study's ledger gives to its campaign; none where there is no ledger."""
+    from towtank.artefact import read_json
+
+    try:
+        stages = read_json(root / "study.json", "towtank/study/1").get("stages", {})
+    except ArtefactError:
+        return set()
+    return {Path(name).parent.name for name in stages.get("tow", {}).get("files", {})}
 
 
 def _in_plan(plan: Plan | None, runs: tuple[Run, ...]) -> tuple[Run, ...]:

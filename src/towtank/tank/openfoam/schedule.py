@@ -82,7 +82,7 @@ def schedule(craft: Craft, tests: Sequence[CaptiveTest], mesh: MeshSettings, num
         domain = domain_of(craft, test, mesh.half)
         across = domain.to_mesh(nu[:3])[1:]
         fins = test.fins if any(test.fins) else ()
-        chains[domain, fins, test.speed, bool((across < 0.0).any())].append((float(np.linalg.norm(across)), number))
+        chains[domain, fins, test.speed, bool((across > 0.0).any())].append((float(np.linalg.norm(across)), number))
     pace = Pace()
     costs = tuple(pace.cpu(cells_of(craft, test, mesh), numerics, test) for test in tests)
     return Schedule(tuple(tuple(number for _, number in sorted(chain)) for chain in chains.values()), costs)
