@@ -19,6 +19,7 @@ from towtank.plan.kinds import CaptiveTest
 from towtank.progress import Progress
 from towtank.tank.identity import run_id
 from towtank.tank.openfoam.case import Case, read_case, write_case
+from towtank.tank.openfoam.errors import with_model_form
 from towtank.tank.openfoam.find import require
 from towtank.tank.openfoam.formulation import Straight, domain_of
 from towtank.tank.openfoam.mesh.grid import MeshSettings
@@ -94,6 +95,12 @@ class OpenFoamTank:
         chosen = PRESETS[self.quality][1] if self.numerics is None else self.numerics
         return chosen if self.turbulence is None else replace(chosen, turbulence=self.turbulence)
 
+    @property
+    def measured_as(self) -> str:
+        """The preset whose measured errors hold; empty when something in it was changed."""
+        changed = self.turbulence or self.mesh or self.numerics or self.refinement != 1.0
+        return "" if changed else self.quality
+
     def settings(self) -> dict[str, Any]:
         """Everything that decides the result beside craft and test. Cores and folders do not."""
         installation = require()
@@ -130,7 +137,7 @@ class OpenFoamTank:
         with self._folder(craft, test) as folder:
             case = self._case(folder, craft, test)
             case, outcome = solve(case, installation, progress, stop=self.stop)
-            return run_of(case, craft, test, self, outcome)
+            return with_model_form(run_of(case, craft, test, self, outcome), self.measured_as)
 
     @contextmanager
     def _folder(self, craft: Craft, test: CaptiveTest) -> Iterator[Path]:
