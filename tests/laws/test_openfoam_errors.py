@@ -15,6 +15,9 @@ from towtank.derive.derive import derive
 from towtank.plan.kinds import CaptiveTest, Plan
 from towtank.plan.motion import Drift, Roll, Turn
 from towtank.plan.standard import standard_plan
+from towtank.report.of_trust import limits
+from towtank.report.pictures import Sketchbook
+from towtank.report.study import Study
 from towtank.symbols import LOADS
 from towtank.tank.campaign import tow
 from towtank.tank.fast.tank import FastTank
@@ -77,3 +80,11 @@ def test_the_error_reaches_the_derivatives_as_model_form():
     # The main part of the drift is at 6 to 20 deg, where Y was off by a fifth; terms of a fit share it unequally.
     assert 0.05 < std["Nuv"] / abs(found["Nuv"]) < 0.3
     assert std["Nur"] / abs(found["Nur"]) > 0.3
+
+
+def test_the_report_prints_the_measured_errors_and_names_what_has_none():
+    known, other = (replace(run, level="rans") for run in runs_of(Drift(1.0, 0.1), Drift(1.0, 0.2)))
+    section = limits(Study(runs=(with_model_form(known, "draft"), with_model_form(other, ""))), Sketchbook())
+    (table,) = [block for block in section.blocks if getattr(block, "title", "").endswith("preset draft")]
+    assert len(table.rows) == len(measured("draft"))
+    assert any("never compared" in getattr(block, "words", "") for block in section.blocks)

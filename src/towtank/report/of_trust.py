@@ -62,6 +62,7 @@ def limits(study: Study, book: Sketchbook) -> Section:
     blocks: list[Block] = [Text(words) for words in LIMITS]
     if "semi-empirical" in study.levels:
         blocks += [Text(words) for words in TANK_LIMITS]
+    blocks += _presets(study)
     if len(study.levels) > 1:
         blocks.append(
             Text(
@@ -77,6 +78,32 @@ def limits(study: Study, book: Sketchbook) -> Section:
     elif study.runs:
         blocks.append(Text("No run carries a validity flag."))
     return Section("limits", "Limits and level of evidence", tuple(blocks))
+
+
+def _presets(study: Study) -> list[Block]:
+    """What each preset of the RANS tank was measured to miss; a table for every preset among the runs."""
+    from towtank.tank.openfoam.errors import SOURCE, measured
+
+    told = [run.provenance.get("model_form") for run in study.runs if run.level == "rans"]
+    blocks: list[Block] = []
+    for preset in dict.fromkeys(str(entry["preset"]) for entry in told if isinstance(entry, Mapping)):
+        rows = [
+            (
+                "drift to" if e.family == "translation" else "turn",
+                f"{e.up_to:g} deg" if e.family == "translation" else "-",
+                e.load,
+                *(number(100.0 * value, 3) for value in (e.bias, e.scatter)),
+                str(e.points),
+            )
+            for e in measured(preset)
+        ]
+        head = ("Motion", "Range", "Load", "Bias [%]", "Scatter [%]", "Points")
+        note = stated("rans", f"error against {SOURCE}; its size is the model form of every run of that kind")
+        blocks.append(Table(f"Measured error of the preset {preset}", head, tuple(rows), note))
+    if any(entry is None for entry in told):
+        words = "Some RANS runs are of a set-up never compared with an experiment; their model form is not stated."
+        blocks.append(Text(words, "missing"))
+    return blocks
 
 
 def constants(study: Study, book: Sketchbook) -> Section:
