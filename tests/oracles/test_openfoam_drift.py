@@ -47,7 +47,8 @@ def test_a_drift_point_ends_by_its_flat_load_in_good_health(drift):
     assert health["ended"] == "flat"
     assert health["change"] < 0.002
     assert health["steps"] < 250
-    assert drift.flags == ()
+    # A set-up of its own was never compared with an experiment, and says so; the solution itself has nothing to say.
+    assert [flag for flag in drift.flags if "model form" not in flag] == []
     least, largest, mean = health["y_plus"]["hull"]
     assert least < mean < largest
     # The mesher aims at a mean y+ by a flat-plate law; on the hull it comes within a fifth.
