@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -52,8 +53,8 @@ def _written(study: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in study.glob("runs/*/run.nc")}
 
 
-def _processes(study: Path) -> list[str]:
-    """Command lines of the solvers that run in the study."""
+def _solvers(study: Path) -> list[int]:
+    """Processes of the solvers that run in the study."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -61,8 +62,21 @@ def _processes(study: Path) -> list[str]:
         except OSError:
             continue
         if b"-case" in words and any(os.fsencode(study) in word for word in words):
-            found.append(os.fsdecode(b" ".join(words)))
+            found.append(int(path.parent.name))
     return found
+
+
+def _signalled(processes: list[int], how: signal.Signals) -> list[int]:
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, how)
+    return processes
+
+
+def _times(study: Path) -> list[Path]:
+    """Times on file of cases that are not solved."""
+    found = (path for path in study.glob("runs/*/case/[1-9]*") if not (path.parent / "outcome.json").exists())
+    return list(found)
 
 
 def _until(condition: Callable[[], bool]) -> None:
@@ -167,26 +181,16 @@ def test_a_failed_run_is_named_with_its_reason_and_tried_again_alone(towed: Path
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_an_ended_campaign_leaves_no_solver_and_goes_on_from_its_files(tmp_path: Path, how: signal.Signals):
     study = tmp_path / "study"
-    words = [
-        sys.executable,
-        "-c",
-        OFTEN,
-        "tow",
-        CRAFT,
-        *ASKED[:-1],
-        "drift-00,drift-p02",
-        "--jobs",
-        "2",
-        "--out",
-        str(study),
-    ]
+    asked = [*ASKED[:-1], "drift-00,drift-p02", "--jobs", "2"]
+    words = [sys.executable, "-c", OFTEN, "tow", CRAFT, *asked, "--out", str(study)]
     process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    _until(lambda: len(_processes(study)) == 2)
+    _until(lambda: any(float(path.name) >= 40.0 for path in _times(study)))  # two times on file, so one can be lost
+    frozen = _signalled(_solvers(study), signal.SIGSTOP)
     second, states = _invoke("tow", "--out", str(study)), _states(study)
-    _until(lambda: len(list(study.glob("runs/*/case/20"))) >= 1)
     process.send_signal(how)
+    _signalled(frozen, signal.SIGCONT)
     _, told = process.communicate(timeout=PATIENCE)
-    _until(lambda: not _processes(study))
+    _until(lambda: not _solvers(study))
     assert second.exit_code == 3
     assert f"process {process.pid}" in second.stderr
     if how == signal.SIGINT:
@@ -197,9 +201,15 @@ def test_an_ended_campaign_leaves_no_solver_and_goes_on_from_its_files(tmp_path:
     assert set(states.values()) <= {"stopped", "done", "to do"}
     assert "stopped" in states.values()
     before = _written(study)
+    last = max(_times(study), key=lambda path: float(path.name))
+    if how == signal.SIGKILL:
+        (last / "p").unlink()  # as a full disk leaves it
     result = _invoke("tow", "--out", str(study))
     assert result.exit_code == 0, result.stderr
     assert {path: time for path, time in _written(study).items() if path in before} == before
+    if how == signal.SIGKILL:
+        outcome = json.loads((last.parent / "outcome.json").read_text())
+        assert f"time {last.name} on file could not be read" in outcome["retries"][0]
     outcomes = [json.loads(path.read_text()) for path in study.glob("runs/*/case/outcome.json")]
     assert any(outcome["resumed"] for outcome in outcomes)
 

@@ -88,7 +88,7 @@ class Log:
     @property
     def broken_file(self) -> bool:
         """True when the solver could not read what it was to start from."""
-        return any("IO ERROR" in line for line in self.errors)
+        return any("IO ERROR" in line for line in self.errors) or any("cannot find file" in line for line in self.tail)
 
     def note(self, extra: str = "") -> str:
         """A line for the progress display."""
