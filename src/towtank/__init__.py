@@ -16,6 +16,7 @@ _PUBLIC = {
     "standard_plan": "towtank.plan.standard",
     "tow": "towtank.tank.campaign",
     "FastTank": "towtank.tank.fast.tank",
+    "OpenFoamTank": "towtank.tank.openfoam.tank",
     "LpmTank": "towtank.tank.lpm",
     "import_runs": "towtank.tank.imported.gate",
     "Run": "towtank.tank.run",
