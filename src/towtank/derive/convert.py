@@ -123,9 +123,10 @@ def _moved(d: Derivatives, shift: float) -> Derivatives:
         name: tuple(dict.fromkeys(run for old in olds for run in d.runs.get(old, ())))
         for name, olds in zip(names, touched, strict=True)
     }
-    origin, std, covariance = _moved_origin(d, shift)
+    origin, std, covariance, across = _moved_origin(d, shift, matrix)
     quality = dict(d.quality)
-    quality["origin"] = {**quality.get("origin", {}), "order": list(origin), "covariance": covariance.tolist()}
+    quality["origin"] = {**quality.get("origin", {}), "order": list(origin), "covariance": covariance.tolist(),
+                         "with_terms": across.tolist()}  # fmt: skip
     quality["moved"] = {
         "shift_forward": shift,
         "note": NOTE,
@@ -139,14 +140,16 @@ def _moved(d: Derivatives, shift: float) -> Derivatives:
     )  # fmt: skip
 
 
-def _moved_origin(d: Derivatives, shift: float) -> tuple[dict[str, float], dict[str, float], Array]:
-    """Slopes at the origin about the new point. Without a stored covariance they are taken as independent.
+def _moved_origin(d: Derivatives, shift: float, wide: Array) -> tuple[dict[str, float], dict[str, float], Array, Array]:
+    """Slopes at the origin about the new point: values, std, covariance (p, p) and covariance with the terms (p, n).
+
+    Without a stored covariance they are taken as independent. wide (moved, n) : as ``transformation`` moves the terms.
 
     Terms whose slope at the origin is not known stay unknown.
     """
     order = list(d.origin)
     if not order:
-        return {}, {}, np.zeros((0, 0))
+        return {}, {}, np.zeros((0, 0)), np.zeros((0, len(wide)))
     stored = d.quality.get("origin", {}).get("covariance")
     old = np.diag([d.origin_std.get(n, 0.0) ** 2 for n in order]) if stored is None else np.array(stored, dtype=float)
     names, matrix = transformation(order, shift)
@@ -154,10 +157,12 @@ def _moved_origin(d: Derivatives, shift: float) -> tuple[dict[str, float], dict[
     names, matrix = tuple(names[i] for i in own), matrix[own]
     values, covariance = matrix @ np.array([d.origin[n] for n in order]), matrix @ old @ matrix.T
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    across = np.array(d.quality.get("origin", {}).get("with_terms", np.zeros((len(order), wide.shape[1]))), dtype=float)
     return (
         dict(zip(names, values.tolist(), strict=True)),
         dict(zip(names, std.tolist(), strict=True)),
         covariance,
+        matrix @ across @ wide.T,
     )
 
 

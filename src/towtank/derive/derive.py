@@ -131,12 +131,13 @@ def _derivatives(it: _Fitted) -> Derivatives:
         rejected=(*it.outside, *it.judged.rejected),
         origin=origin.values,
         origin_std=origin.std,
-        quality=_quality(it, names, expansion, origin),
+        quality=_quality(it, names, expansion, origin, spread),
         provenance=provenance({name: run.id for name, run in zip(names, runs, strict=True)}),
     )
 
 
-def _quality(it: _Fitted, names: Sequence[str], expansion: Expansion, origin: Origin) -> dict[str, Any]:
+def _quality(it: _Fitted, names: Sequence[str], expansion: Expansion, origin: Origin, spread: Array) -> dict[str, Any]:
+    """Numbers about the fit. spread (terms, members) : model-form ensemble of the terms less their nominal values."""
     runs, samples = it.judged.runs, it.judged.samples
     return {
         "symmetry": runs[0].symmetry,
@@ -152,6 +153,7 @@ def _quality(it: _Fitted, names: Sequence[str], expansion: Expansion, origin: Or
             "method": origin.method,
             "order": list(origin.values),
             "covariance": origin.covariance.tolist(),
+            "with_terms": (origin.spread @ spread.T / max(spread.shape[1], 1)).tolist() if origin.values else [],
         },
         "fourier": fourier(runs, samples),
     }

@@ -26,13 +26,14 @@ WINDOW_TURN = 0.305
 class Origin:
     """values, std : term -> slope at the origin and its standard uncertainty. covariance (n, n) in the order of values.
 
-    method : term -> how it was found, in words.
+    method : term -> how it was found, in words.   spread (n, members) : model-form ensemble less the nominal values.
     """
 
     values: dict[str, float] = field(default_factory=dict)
     std: dict[str, float] = field(default_factory=dict)
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
     method: dict[str, str] = field(default_factory=dict)
+    spread: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True)
@@ -117,8 +118,8 @@ def _joined(slopes: Sequence[_Slope]) -> Origin:
         stop = start + len(slope.names)
         covariance[start:stop, start:stop] = slope.covariance
         start = stop
-    if values.shape[1] > 1:
-        spread = values[:, 1:] - values[:, :1]
+    spread = values[:, 1:] - values[:, :1]
+    if spread.shape[1]:
         covariance += spread @ spread.T / spread.shape[1]
     std = np.sqrt(np.diag(covariance))
     return Origin(
@@ -126,6 +127,7 @@ def _joined(slopes: Sequence[_Slope]) -> Origin:
         dict(zip(names, std.tolist(), strict=True)),
         covariance,
         {name: slope.method for slope in slopes for name in slope.names},
+        spread,
     )
 
 
