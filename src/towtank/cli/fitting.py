@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from towtank.cli import budget, towing
 from towtank.cli.study import file_hash
 
 if TYPE_CHECKING:
@@ -26,24 +27,32 @@ def asked(chain: Chain) -> dict[str, str]:
 
 def inputs(chain: Chain) -> dict[str, str]:
     """Name -> hash or text of what the fit depends on beside craft and runs."""
-    return asked(chain) | {"grid": file_hash(_grid_file(chain))}
+    return asked(chain) | {"grid": file_hash(_grid_file(chain)), "budget": towing.asked(chain)["budget"]}
 
 
 def fit(chain: Chain) -> Derivatives:
-    """Derivatives of the runs of the study, checked against the sizes of the craft."""
+    """Derivatives of the runs of the study, checked against the sizes of the craft.
+
+    Within a budget: those of the fast tank, corrected by the runs.
+    """
     from towtank.derive.consistency import consistency
+
+    derived = budget.corrected(chain) if towing.asked(chain)["budget"] else _of_runs(chain)
+    checks = [check.document() for check in consistency(derived, chain.craft)]
+    return replace(derived, quality={**derived.quality, "consistency": checks})
+
+
+def _of_runs(chain: Chain) -> Derivatives:
     from towtank.derive.derive import derive
 
     wanted = asked(chain)
-    derived = derive(
+    return derive(
         chain.runs(),
         weight_steady=float(wanted["steady"]) if wanted["steady"] else None,
         screening=wanted["screening"] == "yes",
-        grid=_grid(chain),
+        grid=mesh_study(chain),
         optional=tuple(wanted["optional"].split(",")) if wanted["optional"] else (),
     )
-    checks = [check.document() for check in consistency(derived, chain.craft)]
-    return replace(derived, quality={**derived.quality, "consistency": checks})
 
 
 def write(chain: Chain) -> Sequence[Path]:
@@ -55,7 +64,7 @@ def write(chain: Chain) -> Sequence[Path]:
     derived = fit(chain)
     write_derivatives(derived, chain.replacing(chain.study.derivatives))
     files = [chain.study.derivatives, chain.write_model()]
-    if any(not run.steady for run in chain.runs()):
+    if any(not run.steady for run in chain.runs()) and not towing.asked(chain)["budget"]:
         files.append(write_frequencies(frequency_study(chain.runs(), derived), chain.study.frequency))
     return files
 
@@ -64,7 +73,7 @@ def _grid_file(chain: Chain) -> Path:
     return chain.study.root / "grid.json"
 
 
-def _grid(chain: Chain) -> GridStudy | None:
+def mesh_study(chain: Chain) -> GridStudy | None:
     """The mesh study of the study folder, when there is one."""
     from towtank.grid.files import read_grid
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from towtank.cli import towing
+from towtank.cli import budget, towing
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, Speed, StudyArgument
 from towtank.cli.reply import answering
@@ -30,6 +30,7 @@ def run(
     refinement: towing.Refinement = None,
     only: towing.Only = None,
     jobs: towing.Jobs = None,
+    time: towing.Budget = None,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -43,14 +44,18 @@ def run(
     Example: towtank run hokie
 
     Example: towtank run hokie --tank openfoam --out hokie-rans
+
+    Example: towtank run hokie --tank openfoam --budget "20 min" --out hokie-both
     """
     with answering("run", json, debug) as reply:
         if cores() > 1:
             prepare(*PRELOADED)
         chain = open_chain(reply, craft, out, speed)
-        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs)
+        spare = None if time is None else budget.seconds(time)
+        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs, spare)
         chain.prepare()
         chain.make_plan()
+        budget.choose_tests(chain)
         chain.tow()
         chain.derive()
         chain.try_out()

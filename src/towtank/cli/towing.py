@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from towtank.tank.tank import Tank
 
 TANKS = ("fast", "openfoam")
-TOWING = {"tank": "fast", "quality": "", "turbulence": "", "refinement": "", "only": ""}
+TOWING = {"tank": "fast", "quality": "", "turbulence": "", "refinement": "", "only": "", "budget": ""}
 """What is asked of a tank that was asked for nothing else: the fast one, all tests. Empty: the tank's own choice."""
 
 TankName = Annotated[
@@ -47,6 +47,11 @@ Only = Annotated[
     typer.Option(metavar="LIST", help='Kinds or names of tests: "drift,sway", "drift-p*", or "all".',
                  show_default=False),
 ]  # fmt: skip
+Budget = Annotated[
+    str | None,
+    typer.Option("--budget", metavar="TIME", show_default=False,
+                 help='With --tank openfoam: the tests worth this wall time, such as "1 h", correct the fast tank.'),
+]  # fmt: skip
 Jobs = Annotated[
     int | None,
     typer.Option("--jobs", metavar="N", help="Cases of OpenFOAM side by side. Default: one a core.",
@@ -68,6 +73,7 @@ def ask(
     refinement: float | None = None,
     only: str | None = None,
     jobs: int | None = None,
+    budget: float | None = None,
 ) -> None:
     """Take what the user says now, on top of what the study was asked before.
 
@@ -91,6 +97,13 @@ def ask(
     if only is not None:
         given["only"] = "" if only.strip() == "all" else ",".join(w.strip() for w in only.split(",") if w.strip())
         wanted = wanted | {"only": ""}
+        wanted = wanted | {"budget": ""}
+    if budget is not None:
+        if wanted["tank"] != "openfoam" or only is not None:
+            raise InputError(
+                "--budget chooses the tests of --tank openfoam by what they tell. Give that tank, and no --only."
+            )
+        wanted = wanted | ({} if wanted["budget"] == f"{budget:g}" else {"budget": f"{budget:g}", "only": ""})
     chain.towing, chain.jobs = wanted | {name: value for name, value in given.items() if value}, jobs
     _ = chain.tank()  # settings that it refuses are told before anything is written
 
