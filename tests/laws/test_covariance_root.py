@@ -5,7 +5,6 @@ import pytest
 
 from towtank.derive.covariance import root_of
 
-
 VALUES = np.ones(8)
 
 
