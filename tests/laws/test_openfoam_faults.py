@@ -269,7 +269,7 @@ def test_a_case_of_another_version_is_written_again(tmp_path, monkeypatch):
     run = tank.run(BARE, DRIFT, Silent())
     folder = tmp_path / "study" / "runs" / run.id / "case"
     (folder / "case.json").write_text('{"schema": "towtank/case/0"}')
-    # The step at which a flat load is noticed depends on the clock; within the limit of flatness, 0.2 %, it is the same.
+    # The step at which a flat load is noticed depends on the clock; within the limit of flatness it is the same.
     assert tank.run(BARE, DRIFT, Silent()).loads == pytest.approx(run.loads, rel=2e-3)
     assert read_case(folder).test == DRIFT
 
