@@ -11,7 +11,7 @@ OUT    ?= hokie
 ENGINE := hatch_build.py $(wildcard src/towtank/symbols.py src/towtank/engine/*.py src/towtank/engine/c/* \
             src/towtank/model/*.py src/towtank/pilot/*.py)
 
-.PHONY: help install openfoam run test lint bench bench-engine bench-derive validate validate-slurm clean
+.PHONY: help install openfoam run test lint bench bench-engine bench-derive validate validate-slurm validate-openfoam clean
 .DEFAULT_GOAL := help
 
 help:
@@ -22,6 +22,7 @@ help:
 	@echo "make lint      the first three of these"
 	@echo "make validate  the longer checks; rewrites the tables in validation/ and that of the report"
 	@echo "make validate-slurm  work shared by jobs of a real one-node Slurm; as root, with Debian's Slurm installed"
+	@echo "make validate-openfoam  the bare SUBOFF hull by RANS, one change of set-up at a time, and on three meshes; an hour"
 	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
 	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
 	@echo "make bench-derive  identification of 200 runs of 2000 samples, written to bench/derive.json"
@@ -67,6 +68,10 @@ validate: $(VENV)/.tools
 
 validate-slurm: $(VENV)/.engine $(VENV)/.tools
 	$(BIN)/pytest -m slurm
+
+validate-openfoam: $(VENV)/.tools
+	$(BIN)/python validation/openfoam_suboff.py
+	$(BIN)/python validation/openfoam_grid.py
 
 bench: $(VENV)/.engine
 	$(BIN)/python benchmarks/bench.py
