@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -96,4 +97,4 @@ def study_table(study: FrequencyStudy) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value:12.5g}" if value == value else f"{'-':>12}"
+    return f"{value:12.5g}" if math.isfinite(value) else f"{'-':>12}"
