@@ -11,7 +11,10 @@ from typing import Any
 from towtank.errors import TrialError
 
 PAUSE = 0.1
-"""How long an item takes [s]: long enough to be killed in the middle of one."""
+"""How long an item takes [s]."""
+
+HELD = 5
+"""The item that ``held`` holds: in the middle of the list."""
 
 
 def noted(log: Path, word: str, item: int) -> None:
@@ -28,6 +31,14 @@ def square(log: Path, item: int) -> dict[str, Any]:
         raise TrialError("13 cannot be carried out.")
     noted(log, "end", item)
     return {"item": item, "square": item * item, "nothing": float("nan")}
+
+
+def held(log: Path, item: int) -> dict[str, Any]:
+    """As ``square``, but ``HELD`` does not end the first time it is started: it waits to be killed."""
+    if item == HELD and item not in counted(log)[0]:
+        noted(log, "start", item)
+        time.sleep(600.0)
+    return square(log, item)
 
 
 def deadly(log: Path, item: int) -> dict[str, Any]:
