@@ -51,26 +51,71 @@ def _draft(mesh: dict[str, Any] | None = None, **numerics: Any) -> OpenFoamTank:
 
 
 ALL = (4, 8, 12, 16, 18)
+WALL = {"y_plus": 1.0, "out": 48}
+"""The wall resolved: cells out of the hull besides."""
+
 VARIANTS: dict[str, Variant] = {
     "draft": Variant(OpenFoamTank("draft"), "none", ALL, arm=True),
     "standard": Variant(OpenFoamTank("standard"), "preset standard", ALL, arm=True),
+    "fine": Variant(OpenFoamTank("fine"), "preset fine", ALL, arm=True),
     "sst": Variant(_draft(turbulence="kOmegaSST"), "k-omega SST, wall functions", ALL, arm=True),
+    "realizable": Variant(_draft(turbulence="realizableKE"), "realizable k-epsilon, wall functions", ALL, arm=True),
+    "rng": Variant(_draft(turbulence="RNGkEpsilon"), "RNG k-epsilon, wall functions", arm=True),
+    "quadratic": Variant(_draft(turbulence="ShihQuadraticKE"), "quadratic k-epsilon of Shih, wall functions", arm=True),
+    "spalart": Variant(_draft(turbulence="SpalartAllmaras"), "Spalart-Allmaras, wall function", arm=True),
+    "stress": Variant(_draft(turbulence="SSG"), "Reynolds-stress model SSG, wall functions", arm=True),
+    "stress-lrr": Variant(_draft(turbulence="LRR"), "Reynolds-stress model LRR, wall functions", (12,)),
     "finer": Variant(OpenFoamTank("draft", refinement=4.0 / 3.0), "2.4 times the cells"),
     "coarser": Variant(OpenFoamTank("draft", refinement=0.75), "0.42 times the cells"),
+    "realizable-finer": Variant(
+        OpenFoamTank("draft", turbulence="realizableKE", refinement=4.0 / 3.0), "realizable, 2.4 times the cells", ALL,
+        arm=True,
+    ),
+    "realizable-finest": Variant(
+        OpenFoamTank("draft", turbulence="realizableKE", refinement=16.0 / 9.0), "realizable, 5.6 times the cells",
+        (4, 12), arm=True,
+    ),
+    "realizable-thin": Variant(
+        _draft({"y_plus": 30.0}, turbulence="realizableKE"), "realizable, first cell at y+ 30", (4, 12), arm=True
+    ),
+    "realizable-blended": Variant(
+        _draft(turbulence="realizableKE", convection="LUST grad(U)"), "realizable, U convected by LUST", (4, 12),
+        arm=True,
+    ),
+    "realizable-limited": Variant(
+        _draft(turbulence="realizableKE", convection_turbulence="limitedLinear 1"),
+        "realizable, turbulence convected by limitedLinear", (4, 12), arm=True,
+    ),
+    "stern": Variant(_draft({"along": 90}), "1.5 times the cells along"),
+    "girth": Variant(_draft({"around": 24}), "1.5 times the cells around"),
+    "layers": Variant(_draft({"out": 48}), "1.5 times the cells out"),
     "limited": Variant(_draft(convection_turbulence="limitedLinear 1"), "turbulence convected by limitedLinear"),
+    "blended": Variant(_draft(convection="LUST grad(U)"), "U convected by LUST"),
+    "unlimited": Variant(_draft(limiter=0.0), "gradient of U not limited"),
     "thin-wall": Variant(_draft({"y_plus": 30.0}), "first cell at y+ 30"),
     "thick-wall": Variant(_draft({"y_plus": 100.0}), "first cell at y+ 100"),
     "far": Variant(_draft({"far": 5.0}), "far field at twice the distance"),
+    "near": Variant(_draft({"far": 0.8}), "far field as near as the bottom of the basin"),
     "full": Variant(_draft({"half": False}), "full domain"),
     "quiet": Variant(_draft(intensity=0.001, viscosity_ratio=1.0), "inflow turbulence 0.1 %, nut/nu 1"),
-    "fins": Variant(OpenFoamTank("draft"), "hull and four fins", (2,), arm=True, craft="suboff-fins"),
+    "stirred": Variant(_draft(intensity=0.03, viscosity_ratio=100.0), "inflow turbulence 3 %, nut/nu 100"),
+    "unsteady": Variant(_draft(travel=6.0), "solved in time over 6 lengths", (12, 18)),
+    "unsteady-full": Variant(
+        _draft({"half": False}, travel=6.0, turbulence="kOmegaSST"), "k-omega SST in time, full domain", (18,)
+    ),
     "resolved": Variant(
-        _draft({"y_plus": 1.0, "out": 48}, turbulence="kOmegaSST", wall="resolved", iterations=1200),
-        "k-omega SST to the wall, y+ 1",
+        _draft(WALL, turbulence="kOmegaSST", wall="resolved", iterations=1200), "k-omega SST to the wall, y+ 1",
+        arm=True,
+    ),
+    "resolved-spalart": Variant(
+        _draft(WALL, turbulence="SpalartAllmaras", wall="resolved", iterations=1200), "Spalart-Allmaras to the wall",
+    ),
+    "low-reynolds": Variant(
+        _draft(WALL, turbulence="LaunderSharmaKE", wall="resolved", iterations=1200),
+        "k-epsilon of Launder and Sharma to the wall", (12,),
     ),
     "transition": Variant(
-        _draft({"y_plus": 1.0, "out": 48}, turbulence="kOmegaSSTLM", wall="resolved", iterations=1200,
-               intensity=0.03),
+        _draft(WALL, turbulence="kOmegaSSTLM", wall="resolved", iterations=1200, intensity=0.03),
         "gamma transition model to the wall", (4, 12),
     ),
 }  # fmt: skip

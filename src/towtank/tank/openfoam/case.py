@@ -26,13 +26,14 @@ from towtank.tank.openfoam.formulation import (
     Moving,
     StillWater,
     Straight,
+    Unsteady,
     domain_of,
     fastest,
     formulation_of,
 )
 from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
 from towtank.tank.openfoam.mesh.poly import PolyMesh, write_mesh
-from towtank.tank.openfoam.motion import Timeline, motion_table, pose, timeline
+from towtank.tank.openfoam.motion import Timeline, motion_table, pose, timeline, travelled
 from towtank.tank.openfoam.numerics import MODELS, Numerics
 
 SCHEMA = "towtank/case/1"
@@ -53,8 +54,9 @@ class Case:
     """A case on disk.
 
     folder : of the case.   test : what it runs.   domain, formulation : how.   numerics : as written.
-    line : steps of a moving case, None for a steady one.   walls : names of the wall patches.   cells, label : of the
-    mesh; ``mesh`` is a hash of it.   length [m], density [kg/m3].   ranks : processes it is cut for.
+    line : steps of a case that is solved in time, None for a steady one.   walls : names of the wall patches.
+    cells, label : of the mesh; ``mesh`` is a hash of it.   length [m], density [kg/m3].
+    ranks : processes it is cut for.
     start : where its first field comes from.
     """
 
@@ -83,6 +85,11 @@ class Case:
     def steady(self) -> bool:
         """True for a steady solver."""
         return self.line is None
+
+    @property
+    def held(self) -> bool:
+        """True where one load, a mean, is that of all samples."""
+        return self.steady or isinstance(self.formulation, Unsteady)
 
     @property
     def total(self) -> int:
@@ -143,7 +150,7 @@ def _meshed(
 ) -> Case:
     """The case, of which only the mesh is written yet."""
     domain = domain_of(craft, test, mesh_settings.half)
-    formulation = formulation_of(test, domain, craft.length)
+    formulation = formulation_of(test, domain, craft.length, unsteady=numerics.travel > 0.0)
     angles = test.fins or (0.0,) * len(craft.fins)
     # One mesh for all tests at a speed; only where there is hardly a tow does the motion set the first cell.
     speed = fastest(test, craft.length) if isinstance(formulation, StillWater) else test.speed
@@ -156,7 +163,7 @@ def _meshed(
         formulation=formulation,
         domain=domain,
         numerics=numerics,
-        line=None if test.motion.period == 0.0 else timeline(test, numerics.steps, numerics.ramp),
+        line=_line(formulation, test, craft.length, numerics),
         walls=tuple(patch.name for patch in mesh.patches if patch.kind == "wall"),
         cells=mesh.cells,
         label=label_of(mesh_settings),
@@ -165,6 +172,13 @@ def _meshed(
         density=craft.water.density,
         ranks=ranks,
     )
+
+
+def _line(formulation: Formulation, test: CaptiveTest, length: float, numerics: Numerics) -> Timeline | None:
+    """Steps of a case that is solved in time."""
+    if isinstance(formulation, Unsteady):
+        return travelled(test.speed, length, numerics.travel, numerics.steps)
+    return timeline(test, numerics.steps, numerics.ramp) if test.motion.period else None
 
 
 def label_of(settings: MeshSettings) -> str:
@@ -180,7 +194,7 @@ def _hash(mesh: PolyMesh) -> str:
 
 def write_motion(case: Case) -> None:
     """Write the table of a moving case at the steps of ``case.line``."""
-    if case.line is None:
+    if case.line is None or isinstance(case.formulation, Unsteady):
         return
     numbers, position, turn = pose(case.test, case.domain, case.formulation, case.line)
     write_text(case.folder / "constant" / "motion.dat", motion_table(numbers, position, turn, case.line.step))
@@ -244,6 +258,7 @@ def context(case: Case, viscosity: float) -> dict[str, Any]:
         "omega": f"{omega:.9g}",
         "epsilon": f"{0.09 * k * omega:.9g}",
         "nut": f"{numerics.viscosity_ratio * viscosity:.9g}",
+        "stress": f"{2.0 * k / 3.0:.9g}",
         "re_theta": f"{_re_theta(percent):.6g}",
         "inflow": _vector(inflow),
         "centre": _vector((*formulation.centre, 0.0)) if isinstance(formulation, Arm) else "",
@@ -344,7 +359,7 @@ def _case(folder: Path, document: Mapping[str, Any]) -> Case:
     test = dict(document["test"])
     motion = test.pop("motion")
     test["fins"] = tuple(test["fins"])
-    words: dict[str, Any] = {kind.word: kind for kind in (Straight, Arm, Moving, StillWater)}
+    words: dict[str, Any] = {kind.word: kind for kind in (Straight, Unsteady, Arm, Moving, StillWater)}
     kinds: Mapping[str, Any] = KINDS
     formulation = document["formulation"]
     values = {key: tuple(v) if isinstance(v, list) else v for key, v in formulation["values"].items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -27,7 +28,16 @@ class Straight:
 
     word = "straight"
     application = "simpleFoam"
-    templates = ("common", "steady", "straight")
+    templates: ClassVar[tuple[str, ...]] = ("common", "steady", "straight")
+
+
+@dataclass(frozen=True)
+class Unsteady(Straight):
+    """The same, solved in time from an impulsive start."""
+
+    word = "unsteady"
+    application = "pimpleFoam"
+    templates = ("common", "unsteady", "straight", "at-rest")
 
 
 @dataclass(frozen=True)
@@ -70,7 +80,7 @@ class StillWater:
     templates = ("common", "unsteady", "still")
 
 
-Formulation = Straight | Arm | Moving | StillWater
+Formulation = Straight | Unsteady | Arm | Moving | StillWater
 
 
 @dataclass(frozen=True)
@@ -124,8 +134,11 @@ def load_limit(test: CaptiveTest, length: float, density: float) -> float:
     return density * length**2 * (fastest(test, length) ** 2 + length * float(acceleration.max()))
 
 
-def formulation_of(test: CaptiveTest, domain: Domain, length: float) -> Formulation:
-    """The formulation that runs ``test`` on a hull of ``length`` [m], chosen by its motion."""
+def formulation_of(test: CaptiveTest, domain: Domain, length: float, *, unsteady: bool = False) -> Formulation:
+    """The formulation that runs ``test`` on a hull of ``length`` [m], chosen by its motion.
+
+    unsteady : a straight run is solved in time.
+    """
     motion = test.motion
     if motion.period > 0.0:
         swing = fastest(test, length, test.speed)
@@ -134,7 +147,7 @@ def formulation_of(test: CaptiveTest, domain: Domain, length: float) -> Formulat
     if nu[5] != 0.0:
         return Arm(float(nu[5]), (float(-nu[1] / nu[5]), float(nu[0] / nu[5])))
     inflow = domain.to_mesh(-nu[:3]) + 0.0
-    return Straight((float(inflow[0]), float(inflow[1]), float(inflow[2])))
+    return (Unsteady if unsteady else Straight)((float(inflow[0]), float(inflow[1]), float(inflow[2])))
 
 
 def domain_of(craft: Craft, test: CaptiveTest, half: bool | None = None) -> Domain:

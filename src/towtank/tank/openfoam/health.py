@@ -82,11 +82,11 @@ def health_of(case: Case, outcome: Outcome, loads: Array) -> Health:
         courant_max=outcome.courant_max,
         retries=outcome.retries,
         scatter=tuple(float(v) for v in loads.std(axis=0) / load_scale(loads.mean(axis=0), case.length))
-        if case.steady
+        if case.held
         else (),
         y_plus=y_plus(case.folder),
-        periods=0.0 if case.steady else period_difference(loads, case.test.samples, case.length),
-        residual=0.0 if case.steady else harmonic_residual(loads, case.test.samples, case.length),
+        periods=0.0 if case.held else period_difference(loads, case.test.samples, case.length),
+        residual=0.0 if case.held else harmonic_residual(loads, case.test.samples, case.length),
         start=case.start,
     )
 
@@ -104,7 +104,7 @@ def remarks(case: Case, health: Health) -> tuple[str, ...]:
         found.append("Euler in time: first order, damping and added mass mix; not for derivatives unless it must be")
     if health.courant_max > COURANT:
         found.append(f"Courant number {health.courant_max:.0f} above {COURANT:.0f}")
-    if not case.steady and np.isnan(health.periods):
+    if not case.held and np.isnan(health.periods):
         found.append("fewer than two periods after the first: whether the wake has settled is not known")
     if health.periods > PERIODS:
         found.append(f"last two periods differ by {100 * health.periods:.1f} %, limit {100 * PERIODS:.0f} %")

@@ -63,6 +63,15 @@ def timeline(test: CaptiveTest, steps: int, ramp: float, refinement: int = 1) ->
     )
 
 
+def travelled(speed: float, length: float, lengths: float, steps: int) -> Timeline:
+    """``steps`` for each length of an unsteady straight run over ``lengths`` of travel; its last half is recorded.
+
+    speed [m/s], length [m]. A "period" is the time of one length.
+    """
+    total = round(lengths * steps)
+    return Timeline(length / speed / steps, total - total // 2, total // 2, 1, steps)
+
+
 def pose(test: CaptiveTest, domain: Domain, formulation: Formulation, line: Timeline) -> tuple[Steps, Array, Array]:
     """Numbers of the steps (n,), position (n, 3) [m] and rotation vector (n, 3) [rad] of the mesh, in its first axes.
 

@@ -12,8 +12,19 @@ MODELS: dict[str, tuple[str, ...]] = {
     "kEpsilon": ("k", "epsilon", "nut"),
     "kOmegaSST": ("k", "omega", "nut"),
     "kOmegaSSTLM": ("k", "omega", "nut", "gammaInt", "ReThetat"),
+    "realizableKE": ("k", "epsilon", "nut"),
+    "RNGkEpsilon": ("k", "epsilon", "nut"),
+    "ShihQuadraticKE": ("k", "epsilon", "nut"),
+    "LaunderSharmaKE": ("k", "epsilon", "nut"),
+    "SpalartAllmaras": ("nuTilda", "nut"),
+    "LRR": ("k", "R", "epsilon", "nut"),
+    "SSG": ("k", "R", "epsilon", "nut"),
 }
-"""Turbulence model -> its fields. The last is the gamma transition model of Langtry and Menter."""
+"""Turbulence model -> its fields. kOmegaSSTLM is the transition model of Langtry and Menter, LaunderSharmaKE a model of
+low Reynolds number, LRR and SSG are Reynolds-stress models. None corrects for curvature: v1912 holds none that does."""
+
+RESOLVED_ONLY = ("kOmegaSSTLM", "LaunderSharmaKE")
+"""Models without a wall function."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +40,10 @@ class Numerics:
     iterations : most iterations of a steady case.   flat : it stops when the mean load changes by less than this share
     of the largest force and moment between the halves of the last ``window`` iterations.
     relax_u, relax_turbulence : equation under-relaxation of SIMPLEC.
-    convection_turbulence : limited scheme of the turbulence equations: "upwind" or "limitedLinear 1".
+    convection : scheme of the momentum equation.   convection_turbulence : limited scheme of the turbulence equations:
+    "upwind" or "limitedLinear 1".   limiter : of the gradient of U, 1 in full, 0 none.
+    travel : lengths that a straight run goes in an unsteady solution with ``steps`` in each; the loads of the last
+    half are averaged. 0 : a steady one.
     intensity, viscosity_ratio : turbulence of the far field.
     """
 
@@ -45,17 +59,25 @@ class Numerics:
     window: int = 50
     relax_u: float = 0.7
     relax_turbulence: float = 0.5
+    convection: str = "linearUpwind grad(U)"
     convection_turbulence: str = "upwind"
+    limiter: float = 1.0
+    travel: float = 0.0
     intensity: float = 0.01
     viscosity_ratio: float = 10.0
 
     def __post_init__(self) -> None:
         if self.turbulence not in MODELS:
             raise InputError(f"turbulence {self.turbulence!r} is not known. Choose one of {', '.join(MODELS)}.")
-        if self.turbulence == "kOmegaSSTLM" and self.wall != "resolved":
+        if self.turbulence in RESOLVED_ONLY and self.wall != "resolved":
             raise InputError(
-                'turbulence kOmegaSSTLM needs wall = "resolved" and a mesh with y+ below 1: a wall function has no '
-                "laminar part whose transition it could tell."
+                f'turbulence {self.turbulence} needs wall = "resolved" and a mesh with y+ below 1: it describes the '
+                "layer at the wall that a wall function leaves out."
+            )
+        if self.travel and not 1.0 <= self.travel <= 100.0:
+            raise InputError(
+                f"travel {self.travel:g} lengths is not in 1 to 100. The wake needs a length or two to form, and only "
+                "the last half is averaged. Take 6, or 0 for a steady solution."
             )
         if not 0.0 < self.ramp <= 4.0:
             raise InputError(

@@ -57,13 +57,14 @@ def run_of(case: Case, craft: Craft, test: CaptiveTest, tank: Tank, outcome: Out
 
 
 def _held(case: Case, loads: Array, samples: int) -> Array:
-    return np.tile(loads.mean(axis=0), (samples, 1)) if case.steady else loads
+    return np.tile(loads.mean(axis=0), (samples, 1)) if case.held else loads
 
 
 def case_loads(case: Case, name: str = "forces") -> Array:
     """Loads [N, N m] on the whole craft about the body origin, in body axes.
 
-    Steady: the last window of iterations (window, 6). Moving: at each sample of the plan (N, 6).
+    Steady: the last window of iterations (window, 6). Unsteady: the last half of the steps. Moving: at each sample of
+    the plan (N, 6).
     """
     values = measured(case, name)
     if values is None:
@@ -80,6 +81,8 @@ def case_loads(case: Case, name: str = "forces") -> Array:
             f"{case.line.steps}. Remove the folder to have the case run again."
         )
     rows = values[[known[int(step)] for step in wanted], 1:]
+    if case.held:
+        return case.domain.loads_to_body(rows)
     numbers, position, turn = pose(case.test, case.domain, case.formulation, case.line)
     at = wanted - numbers[0]
     return case.domain.loads_to_body(inertial_to_body(rows, position[at], turn[at]))

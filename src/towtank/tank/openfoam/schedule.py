@@ -38,6 +38,8 @@ class Pace:
 
     def cpu(self, cells: float, numerics: Numerics, test: CaptiveTest) -> float:
         """CPU seconds of a run on ``cells``, from its start."""
+        if test.motion.period == 0.0 and numerics.travel:
+            return self.unsteady * cells * numerics.travel * numerics.steps
         if test.motion.period == 0.0:
             return self.steady * cells * min(self.iterations, numerics.iterations)
         return self.unsteady * cells * timeline(test, numerics.steps, numerics.ramp).steps
