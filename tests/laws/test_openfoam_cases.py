@@ -19,11 +19,20 @@ from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import Drift, Heave, Incidence, Pitch, Roll, Surge, Sway, Turn, Yaw
 from towtank.tank.openfoam.case import read_case, split, write_case
 from towtank.tank.openfoam.dictionary import entry, set_entry, take_over_field
-from towtank.tank.openfoam.formulation import Arm, Domain, Moving, StillWater, Straight, domain_of, formulation_of
+from towtank.tank.openfoam.formulation import (
+    Arm,
+    Domain,
+    Moving,
+    StillWater,
+    Straight,
+    Unsteady,
+    domain_of,
+    formulation_of,
+)
 from towtank.tank.openfoam.health import harmonic_residual, period_difference
 from towtank.tank.openfoam.monitor import Log, changes, flat
 from towtank.tank.openfoam.motion import inertial_to_body, pose, timeline
-from towtank.tank.openfoam.numerics import MODELS, Numerics
+from towtank.tank.openfoam.numerics import MODELS, RESOLVED_ONLY, Numerics
 
 BARE, FINNED = tt.read_craft("suboff-bare"), tt.read_craft("suboff-x")
 U, L = 3.0, BARE.length
@@ -69,16 +78,32 @@ def test_every_dictionary_is_whole_text_with_nothing_left_to_fill_in(cases, word
 
 @pytest.mark.parametrize("model", MODELS)
 def test_a_turbulence_model_has_its_fields_and_no_others(tmp_path, model):
-    wall = "resolved" if model == "kOmegaSSTLM" else "functions"
+    wall = "resolved" if model in RESOLVED_ONLY else "functions"
     case = write_case(tmp_path / "case", BARE, TESTS["straight"], TINY, replace(QUICK, turbulence=model, wall=wall))
     assert {path.name for path in (case.folder / "0").iterdir()} == {"U", "p", *MODELS[model]}
     said = (case.folder / "constant" / "turbulenceProperties").read_text("utf-8")
     assert ("laminar;" if model == "laminar" else f"{model};") in said
 
 
-def test_a_transition_model_without_a_resolved_wall_is_refused():
+@pytest.mark.parametrize("model", RESOLVED_ONLY)
+def test_a_model_of_the_layer_at_the_wall_without_a_resolved_wall_is_refused(model):
     with pytest.raises(InputError, match="resolved"):
-        Numerics(turbulence="kOmegaSSTLM")
+        Numerics(turbulence=model)
+
+
+def test_a_travel_too_short_for_a_wake_is_refused():
+    with pytest.raises(InputError, match="1 to 100"):
+        Numerics(travel=0.5)
+
+
+def test_a_straight_run_in_time_records_the_last_half_of_its_travel(tmp_path):
+    case = write_case(tmp_path / "case", BARE, TESTS["straight"], TINY, replace(QUICK, travel=5.0))
+    assert isinstance(case.formulation, Unsteady)
+    assert case.application == "pimpleFoam"
+    assert case.line.end == pytest.approx(5.0 * L / U)
+    assert case.line.samples()[0] == case.line.steps // 2
+    assert not (case.folder / "constant" / "motion.dat").exists()
+    assert read_case(case.folder) == case
 
 
 def test_a_case_on_file_reads_back_as_it_was_written(cases):

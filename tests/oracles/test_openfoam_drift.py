@@ -55,6 +55,13 @@ def test_a_drift_point_ends_by_its_flat_load_in_good_health(drift):
     assert mean == pytest.approx(COARSE.y_plus, rel=0.2)
 
 
+def test_a_reynolds_stress_model_carries_the_moment_of_potential_flow(drift):
+    stress = OpenFoamTank(mesh=COARSE, numerics=Numerics(turbulence="SSG"))
+    run = stress.run(CRAFT, CaptiveTest("drift", U, Drift(U, BETA)), Silent())
+    assert run.provenance["health"]["ended"] == "flat"
+    assert run.loads[0, 5] == pytest.approx(drift.loads[0, 5], rel=0.1)
+
+
 def test_a_drift_angle_held_by_moving_the_mesh_is_steady_drift(drift):
     """The mesh turns by the angle and moves aside in a stream; loads in space, turned back, are those of drift."""
     test = CaptiveTest("held", U, Held(U, BETA, 0.3, 2.0), periods=1, samples=16)
