@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from openfoam_suboff import RATE, WORK
+from openfoam_suboff import RATE, SLOPES, WORK, write_errors
 from suboff import DATA, L, U
 from tables import read_table, write_table
 from towtank import read_craft
@@ -20,10 +21,9 @@ from towtank.frames import Array
 from towtank.plan.kinds import CaptiveTest, Plan
 from towtank.plan.motion import Drift, Sway, Turn, Yaw
 from towtank.tank.campaign import tow
-from towtank.tank.openfoam.tank import OpenFoamTank
+from towtank.tank.openfoam.tank import PRESETS, OpenFoamTank
 from towtank.tank.run import Run
 
-TARGET = Path(__file__).with_suffix(".csv")
 HEAD = ("setup", "craft", "quantity", "predicted", "measured", "error_percent", "of_fins", "cpu_s")
 SMALL = np.radians(2.0)
 """Drift [rad] whose load over v' is taken for a slope."""
@@ -40,17 +40,21 @@ CREEP = 0.02
 CRAFTS = {"bare": "suboff-bare", "fins": "suboff-fins", "x": "suboff-x"}
 
 
-def _like(quality: str, turbulence: str | None = None, refinement: float = 1.0) -> OpenFoamTank:
-    return OpenFoamTank(quality, turbulence=turbulence, refinement=refinement)
+def _like(turbulence: str = "realizableKE", **mesh: Any) -> OpenFoamTank:
+    chosen, numerics = PRESETS["draft"]
+    return OpenFoamTank(mesh=replace(chosen, **mesh), numerics=replace(numerics, turbulence=turbulence))
 
 
 SETUPS: dict[str, OpenFoamTank] = {
-    "draft": _like("draft"),
-    "sst": _like("draft", "kOmegaSST"),
-    "realizable": _like("draft", "realizableKE"),
-    "finer": _like("draft", refinement=4.0 / 3.0),
-    "realizable-finer": _like("draft", "realizableKE", 4.0 / 3.0),
-    "realizable-finest": _like("draft", "realizableKE", 5.0 / 3.0),
+    "draft": OpenFoamTank("draft"),
+    "standard": OpenFoamTank("standard"),
+    "fine": OpenFoamTank("fine"),
+    "k-epsilon": _like("kEpsilon"),
+    "sst": _like("kOmegaSST"),
+    "realizable": _like(),
+    "chord": _like(along=72, chord=18),
+    "chord-girth": _like(along=72, chord=18, around=24),
+    "chord-finer": _like(along=72, chord=18, refinement=4.0 / 3.0),
 }
 
 
@@ -141,15 +145,16 @@ def _row(
 def main(wanted: Sequence[str]) -> None:
     """Run the set-ups named, or all, and keep the rows of the others."""
     kept: dict[str, list[tuple[str, ...]]] = {}
-    if TARGET.exists():
-        for row in read_table(TARGET):
+    if SLOPES.exists():
+        for row in read_table(SLOPES):
             kept.setdefault(row["setup"], []).append(tuple(row[key] for key in HEAD))
     for setup in list(wanted) or list(SETUPS):
         kept[setup] = list(rows(setup))
         for row in kept[setup]:
             print(*row, flush=True)
         ordered = [row for known in SETUPS for row in kept.get(known, ())]
-        write_table(TARGET, "DARPA SUBOFF, primes on 4.261 m about 2.013 m aft of the nose", HEAD, ordered)
+        write_table(SLOPES, "DARPA SUBOFF, primes on 4.261 m about 2.013 m aft of the nose", HEAD, ordered)
+    write_errors()
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from towtank.tank.openfoam.tank import PRESETS, OpenFoamTank
 from towtank.tank.run import Run
 
 TARGET = Path(__file__).with_suffix(".csv")
+SLOPES = TARGET.with_name("openfoam_slopes.csv")
 WORK = Path(__file__).parents[1] / "bench" / "openfoam"
 HEAD = ("variant", "change", "cells", "test", "load", "predicted", "measured", "error_percent", "cpu_s", "ended")
 RATE = 0.2
@@ -42,7 +43,6 @@ class Variant:
     change: str
     angles: tuple[int, ...] = (4, 12, 18)
     arm: bool = False
-    craft: str = "suboff-bare"
 
 
 def _draft(mesh: dict[str, Any] | None = None, **numerics: Any) -> OpenFoamTank:
@@ -123,7 +123,7 @@ VARIANTS: dict[str, Variant] = {
 
 def plan_of(variant: Variant) -> Plan:
     """Drift tests at the measured angles, and the turn."""
-    craft = read_craft(variant.craft)
+    craft = read_craft("suboff-bare")
     tests = [CaptiveTest(f"drift-{angle}", U, Drift(U, drift_point(angle)[0])) for angle in variant.angles]
     if variant.arm:
         tests.append(CaptiveTest("turn", U, Turn(U, RATE * U / L)))
@@ -144,7 +144,7 @@ def rows(name: str, variant: Variant) -> Iterator[tuple[str, ...]]:
 
 def _compared(name: str, variant: Variant, test: CaptiveTest, run: Run) -> Iterator[tuple[str, ...]]:
     load = run.loads[0] / (0.5 * run.density * U**2 * L**2) / np.array([1, 1, 1, L, L, L])
-    measured = _measured(test, variant)
+    measured = _measured(test)
     health, mesh = run.provenance["health"], run.provenance["mesh"]
     scale = RATE if test.kind == "turn" else 1.0
     for letter, value in measured.items():
@@ -156,14 +156,10 @@ def _compared(name: str, variant: Variant, test: CaptiveTest, run: Run) -> Itera
         )  # fmt: skip
 
 
-def _measured(test: CaptiveTest, variant: Variant) -> dict[str, float]:
+def _measured(test: CaptiveTest) -> dict[str, float]:
     if test.kind == "turn":
-        known = DATA["derivatives"]["bare" if variant.craft == "suboff-bare" else "fins"]
+        known = DATA["derivatives"]["bare"]
         return {"Y": known["Yr"], "N": known["Nr"]}
-    if variant.craft == "suboff-fins":
-        slope = -np.sin(getattr(test.motion, "angle", 0.0))
-        known = DATA["derivatives"]["fins"]
-        return {"Y": float(known["Yv"] * slope), "N": float(known["Nv"] * slope)}
     _, x, y, n = drift_point(int(test.name.split("-")[1]))
     return {"X": x, "Y": y, "N": n}
 
@@ -172,8 +168,11 @@ RANGES = (6.0, 14.0, 20.0)
 """Ends [deg] of the ranges of drift for which the error of a preset is stated."""
 
 
-def preset_errors(table: Sequence[dict[str, str]]) -> dict[str, list[dict[str, Any]]]:
-    """Bias and scatter of each preset by load and range of angles; the rotary slopes are one number each."""
+def preset_errors(table: Sequence[dict[str, str]], slopes: Sequence[dict[str, str]]) -> dict[str, list[dict[str, Any]]]:
+    """Bias and scatter of each preset by load and range of angles; the rotary slopes are one number each.
+
+    ``slopes`` : rows of ``openfoam_slopes``, for the hull with fins, whose drift of 2 deg stands for the first range.
+    """
     out: dict[str, list[dict[str, Any]]] = {}
     for preset in PRESETS:
         for load in "XYN":
@@ -186,15 +185,26 @@ def preset_errors(table: Sequence[dict[str, str]]) -> dict[str, list[dict[str, A
                 low = high
             slope = [row for row in table if row["variant"] == preset and row["load"] == f"{load}'r"]
             _add(out, preset, ("rotation", load, 90.0), [float(row["error_percent"]) for row in slope])
+        for quantity, family, up_to in (("v", "translation", RANGES[0]), ("r", "rotation", 90.0)):
+            for load in "YN":
+                own = [row for row in slopes if (row["setup"], row["craft"]) == (preset, "fins")]
+                errors = [float(row["error_percent"]) for row in own if row["quantity"] == load + quantity]
+                _add(out, preset, (family, load, up_to), errors, fins=True)
     return out
 
 
-def _add(out: dict[str, list[dict[str, Any]]], preset: str, what: tuple[str, str, float], errors: list[float]) -> None:
+def _add(
+    out: dict[str, list[dict[str, Any]]],
+    preset: str,
+    what: tuple[str, str, float],
+    errors: list[float],
+    fins: bool = False,
+) -> None:
     if errors:
         share = np.array(errors) / 100.0
         family, load, up_to = what
         entry = {"family": family, "load": load, "up_to": up_to, "bias": float(round(share.mean(), 4)),
-                 "scatter": float(round(share.std(), 4)), "points": len(errors)}  # fmt: skip
+                 "scatter": float(round(share.std(), 4)), "points": len(errors), "fins": fins}  # fmt: skip
         out.setdefault(preset, []).append(entry)
 
 
@@ -211,7 +221,13 @@ def main(wanted: Sequence[str]) -> None:
             print(*row)
         ordered = [row for known in VARIANTS for row in kept.get(known, ())]
         write_table(TARGET, "bare hull of DARPA SUBOFF, primes on 4.261 m about 2.013 m aft of the nose", HEAD, ordered)
-    document = {"schema": SCHEMA, "source": SOURCE, "presets": preset_errors(read_table(TARGET))}
+    write_errors()
+
+
+def write_errors() -> None:
+    """Rewrite the errors that the presets carry, from the tables on file."""
+    tables = [read_table(table) if table.exists() else [] for table in (TARGET, SLOPES)]
+    document = {"schema": SCHEMA, "source": SOURCE, "presets": preset_errors(*tables)}
     write_json(FILE, {**document, "provenance": provenance(made_by="validation/openfoam_suboff.py")})
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from openfoam_suboff import TARGET, preset_errors
+from openfoam_suboff import SLOPES, TARGET, preset_errors
 from tables import read_table
 from towtank.artefact import read_json
 from towtank.craft.library import read_craft
@@ -32,7 +32,7 @@ def runs_of(*motions):
 
 
 def test_the_errors_of_the_package_are_those_of_the_table():
-    assert read_json(FILE, SCHEMA)["presets"] == preset_errors(read_table(TARGET))
+    assert read_json(FILE, SCHEMA)["presets"] == preset_errors(read_table(TARGET), read_table(SLOPES))
 
 
 def test_the_ensemble_has_the_measured_error_and_no_mean():

@@ -91,13 +91,14 @@ def _presets(study: Study) -> list[Block]:
             (
                 "drift to" if e.family == "translation" else "turn",
                 f"{e.up_to:g} deg" if e.family == "translation" else "-",
+                "with fins" if e.fins else "bare",
                 e.load,
                 *(number(100.0 * value, 3) for value in (e.bias, e.scatter)),
                 str(e.points),
             )
             for e in measured(preset)
         ]
-        head = ("Motion", "Range", "Load", "Bias [%]", "Scatter [%]", "Points")
+        head = ("Motion", "Range", "Hull", "Load", "Bias [%]", "Scatter [%]", "Points")
         note = stated("rans", f"error against {SOURCE}; its size is the model form of every run of that kind")
         blocks.append(Table(f"Measured error of the preset {preset}", head, tuple(rows), note))
     if any(entry is None for entry in told):

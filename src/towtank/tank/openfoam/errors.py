@@ -21,7 +21,7 @@ from towtank.tank.run import Run
 
 FILE = Path(__file__).with_name("errors.json")
 SCHEMA = "towtank/preset-errors/1"
-SOURCE = "bare hull of SUBOFF, roddy1990"
+SOURCE = "SUBOFF, hull with and without fins, roddy1990"
 MEMBERS = 48
 """Size of the ensemble, that of the fast tank by default."""
 
@@ -39,7 +39,7 @@ TWINS = {"Z": "Y", "M": "N"}
 class Measured:
     """Error of a load, predicted over measured less one.
 
-    up_to [deg] : largest drift.   points : number of measurements.
+    fins : of a hull with fins.   up_to [deg] : largest drift.   points : number of measurements.
     """
 
     family: str
@@ -48,6 +48,7 @@ class Measured:
     bias: float
     scatter: float
     points: int
+    fins: bool = False
 
     @property
     def size(self) -> float:
@@ -68,16 +69,20 @@ def measured(preset: str) -> tuple[Measured, ...]:
     return tuple(Measured(**entry) for entry in found)
 
 
-def error_of(preset: str, kind: str, load: str, angle: float) -> tuple[float, bool]:
+def error_of(preset: str, kind: str, load: str, angle: float, fins: bool = False) -> tuple[float, bool]:
     """Root mean square error of a load in a kind of run at ``angle`` [deg], and whether it was measured as such.
 
-    Beyond the largest measured angle that of the last range stands.
+    Beyond the largest measured angle that of the last range stands. With fins, the larger error of the hull with fins
+    and of the bare one: the first was measured at small angles only, and totals hide errors that cancel.
     """
     errors = measured(preset)
     own = [e for e in errors if (e.family, e.load) == (FAMILIES.get(kind), TWINS.get(load, load))]
-    if own:
-        ranges = sorted(own, key=lambda e: e.up_to)
-        return next((e.size for e in ranges if angle <= e.up_to + 0.5), ranges[-1].size), True
+    sizes = []
+    for kept in (False, True)[: 1 + fins]:
+        ranges = sorted((e for e in own if e.fins == kept), key=lambda e: e.up_to)
+        sizes += [next((e.size for e in ranges if angle <= e.up_to + 0.5), ranges[-1].size)] if ranges else []
+    if sizes:
+        return max(sizes), True
     return max((e.size for e in errors), default=float("nan")), False
 
 
@@ -94,7 +99,7 @@ def with_model_form(run: Run, preset: str) -> Run:
         return replace(run, flags=(*run.flags, f"{named} was never compared with an experiment: no model form"))
     nu = run.history.nu
     angle = float(np.degrees(max(np.abs(drift_angle(nu)).max(), np.abs(incidence_angle(nu)).max())))
-    errors = {load: error_of(preset, run.kind, load, angle) for load in LOADS}
+    errors = {load: error_of(preset, run.kind, load, angle, "fins" in run.parts) for load in LOADS}
     family = FAMILIES.get(run.kind, run.kind)
     factors = 1.0 + np.array([size * _draws(family, load) for load, (size, _) in errors.items()])
     acting = [load for i, load in enumerate(LOADS) if np.any(run.loads[:, i])]

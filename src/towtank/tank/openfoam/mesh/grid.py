@@ -41,7 +41,8 @@ class MeshSettings:
     """Cells ``along`` the hull from pole to pole, ``around`` over 180 deg, and ``out`` to the far ellipse.
 
     ``y_plus``: of the centre of the first cell. ``far``: radius of the outer ellipse [lengths]. ``refinement`` scales
-    the three counts together. ``half``: half domain or not; None leaves it to the test.
+    the three counts together. ``chord``: least cells of ``along`` on the chord of the fins, refined with it.
+    ``half``: half domain or not; None leaves it to the test.
     """
 
     along: int = 80
@@ -50,6 +51,7 @@ class MeshSettings:
     y_plus: float = 60.0
     far: float = 2.5
     refinement: float = 1.0
+    chord: int = 0
     half: bool | None = None
 
     def counts(self) -> tuple[int, int, int]:
@@ -119,7 +121,7 @@ def mesh_of(
     found = layout(craft, shape, fins)
     if half and found is not None:
         _mirrored(craft, found)
-    stations, edges = _stations(shape, along, around, found)
+    stations, edges = _stations(shape, along, around, found, round(settings.chord * settings.refinement))
     ends = cap_cells(around)
     sheets, radial, tip = even_planes(around), _geometric(wall, out), 0
     if found is not None:
@@ -165,8 +167,12 @@ def _mirrored(craft: Craft, found: Layout) -> None:
             )
 
 
-def _stations(shape: Outline, along: int, around: int, found: Layout | None) -> tuple[Array, tuple[int, int]]:
+def _stations(
+    shape: Outline, along: int, around: int, found: Layout | None, chord: int = 0
+) -> tuple[Array, tuple[int, int]]:
     """Arcs (along + 1,) of the stations, and the stations of the fins' edges: caps of even cells, growth elsewhere.
+
+    ``chord`` : least cells on the chord of the fins.
 
     Raises
     ------
@@ -196,6 +202,9 @@ def _stations(shape: Outline, along: int, around: int, found: Layout | None) -> 
             sources += [(edge, 0.0, fine * found.chord / along)
                         for edge, fine in zip(edges, _EDGE_CELLS, strict=True)]  # fmt: skip
         near = [fine + growth * np.maximum(np.abs(s - at) - flat, 0.0) for at, flat, fine in sources]
+        if found and chord:
+            beside = np.maximum(np.maximum(edges[0] - s, s - edges[1]), 0.0)
+            near.append((edges[1] - edges[0]) / chord + growth * beside)
         return np.asarray(np.minimum(np.min(near, axis=0), longest))
 
     cells = scaled(s, size, along)
