@@ -31,6 +31,7 @@ from towtank.tank.openfoam.formulation import (
     formulation_of,
 )
 from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
+from towtank.tank.openfoam.mesh.imported import WALL, SurfaceMesh
 from towtank.tank.openfoam.mesh.poly import PolyMesh, write_mesh
 from towtank.tank.openfoam.motion import Timeline, motion_table, pose, timeline
 from towtank.tank.openfoam.numerics import MODELS, Numerics
@@ -94,7 +95,7 @@ def write_case(
     folder: Path,
     craft: Craft,
     test: CaptiveTest,
-    mesh_settings: MeshSettings,
+    mesh_settings: MeshSettings | SurfaceMesh,
     numerics: Numerics,
     ranks: int = 1,
     start_from: Path | None = None,
@@ -139,16 +140,28 @@ def write_case(
 
 
 def _meshed(
-    folder: Path, craft: Craft, test: CaptiveTest, mesh_settings: MeshSettings, numerics: Numerics, ranks: int
+    folder: Path,
+    craft: Craft,
+    test: CaptiveTest,
+    mesh_settings: MeshSettings | SurfaceMesh,
+    numerics: Numerics,
+    ranks: int,
 ) -> Case:
     """The case, of which only the mesh is written yet."""
     domain = domain_of(craft, test, mesh_settings.half)
     formulation = formulation_of(test, domain, craft.length)
-    angles = test.fins or (0.0,) * len(craft.fins)
     # One mesh for all tests at a speed; only where there is hardly a tow does the motion set the first cell.
     speed = fastest(test, craft.length) if isinstance(formulation, StillWater) else test.speed
-    mesh = mesh_of(domain.craft_in_mesh(craft), mesh_settings, half=domain.half, fins=angles, speed=speed)
-    write_mesh(mesh, folder)
+    if isinstance(mesh_settings, SurfaceMesh):
+        walls: tuple[str, ...] = (WALL,)
+        label = mesh_settings.label
+        cells, name = mesh_settings.write(folder, craft, test, speed)
+    else:
+        angles = test.fins or (0.0,) * len(craft.fins)
+        mesh = mesh_of(domain.craft_in_mesh(craft), mesh_settings, half=domain.half, fins=angles, speed=speed)
+        write_mesh(mesh, folder)
+        walls = tuple(patch.name for patch in mesh.patches if patch.kind == "wall")
+        cells, label, name = mesh.cells, label_of(mesh_settings), _hash(mesh)
     return Case(
         folder=folder,
         test=test,
@@ -157,10 +170,10 @@ def _meshed(
         domain=domain,
         numerics=numerics,
         line=None if test.motion.period == 0.0 else timeline(test, numerics.steps, numerics.ramp),
-        walls=tuple(patch.name for patch in mesh.patches if patch.kind == "wall"),
-        cells=mesh.cells,
-        label=label_of(mesh_settings),
-        mesh=_hash(mesh),
+        walls=walls,
+        cells=cells,
+        label=label,
+        mesh=name,
         length=craft.length,
         density=craft.water.density,
         ranks=ranks,
