@@ -256,17 +256,20 @@ def test_faces_of_more_corners_are_measured_like_the_same_ones_of_four():
 
 def test_poor_layers_are_a_remark_with_the_limit_and_what_may_be_done(tmp_path):
     layers = {"covered": 0.55, "asked": 7, "y_plus": (60.0, 60.0, 533.0)}
-    measures = {"verdict": [], "layers": layers, "area": 1.0}
+    measures = {"verdict": [], "layers": layers, "area": 1.0, "told": {"layers": 3.9}, "layers_by_face": 3.85}
     (words,) = mesh_remarks(measures)
     assert "55 % of the wall has the 7 layers asked for, limit 80 %; y+ reaches 533" in words
     assert "fewer layers" in words
-    assert mesh_remarks({**measures, "layers": {**layers, "covered": COVERED}}) == ()
-    assert "area" in mesh_remarks({**measures, "layers": {**layers, "covered": 1.0}, "area": 0.9})[0]
+    good = {**measures, "layers": {**layers, "covered": COVERED}}
+    assert mesh_remarks(good) == ()
+    assert "says 6.5 layers, 3.85 are there" in mesh_remarks({**good, "told": {"layers": 6.5}})[0]
+    assert "area" in mesh_remarks({**good, "area": 0.9})[0]
     assert mesh_remarks(measures_of(tmp_path)) == ()
 
 
-def test_a_coarse_surface_is_meshed_and_its_layers_are_there(tmp_path):
+def test_a_coarse_surface_is_meshed_and_its_layers_are_there(tmp_path, monkeypatch):
     """Real blockMesh, snappyHexMesh and 30 iterations on a spheroid of 6:1. Needs OpenFOAM."""
+    monkeypatch.setattr("towtank.tank.openfoam.case.WRITE_EVERY", 30)
     craft = tt.read_craft("spheroid-6-1")
     path = write_stl(craft, tmp_path / "spheroid.stl")
     speed = 1.0

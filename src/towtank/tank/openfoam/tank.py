@@ -165,7 +165,12 @@ class OpenFoamTank:
         """
         installation = require()
         with self._folder(craft, test) as folder:
-            case = self._case(folder, craft, test)
+            task = f"mesh {test.name}"
+            progress.start(task, 1)
+            try:
+                case = self._case(folder, craft, test)
+            finally:
+                progress.done(task)
             case, outcome = solve(case, installation, progress, stop=self.stop)
             return with_model_form(run_of(case, craft, test, self, outcome), self.measured_as)
 

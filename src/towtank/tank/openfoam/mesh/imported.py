@@ -42,6 +42,10 @@ part of the boundary layer, where a wall function takes the friction from the wr
 AREA = 0.03
 """Judgement: share by which the wall of the mesh may differ in area from the surface; friction goes with it."""
 
+DOUBT = 0.1
+"""Judgement: share of the layers asked for by which the count may differ from that of snappyHexMesh's log, which is
+rounded to two digits or so."""
+
 FILES = ("points", "faces", "owner", "neighbour", "boundary")
 
 
@@ -206,6 +210,9 @@ def mesh_remarks(measures: Mapping[str, Any]) -> tuple[str, ...]:
             f"{100 * COVERED:.0f} %; y+ reaches {layers['y_plus'][2]:.0f} within 95 % of it: ask for fewer layers, or "
             "more cells_across, or mend the surface where they are missing"
         )
+    claim, found = measures["told"].get("layers"), measures["layers_by_face"]
+    if claim is not None and abs(claim - found) > DOUBT * max(layers["asked"], 1):
+        out.append(f"snappyHexMesh says {claim:.3g} layers, {found:.3g} are there: trust neither, look at the mesh")
     if abs(measures["area"] - 1.0) > AREA:
         out.append(
             f"wall of the mesh has {100 * measures['area']:.1f} % of the area of the surface, limit "
