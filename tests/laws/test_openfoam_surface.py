@@ -140,6 +140,9 @@ def test_layers_end_at_half_the_width_of_the_cells_above_them():
         width = settings.wall_cell(craft)
         assert heights[0] == pytest.approx(first_cell(60.0, craft.speed, craft.length, craft.water.kinematic_viscosity))
         assert heights[-1] <= 0.5 * width < heights[-1] * settings.expansion
+        fewer = settings.heights(craft, craft.speed, sharp=True)
+        assert 1 <= len(fewer) < len(heights)
+        assert fewer[-1] <= max(0.25 * width, fewer[0])
 
 
 def test_the_identity_of_a_run_follows_the_content_of_the_surface_and_not_its_name(stl, tmp_path):
@@ -207,6 +210,15 @@ def test_layers_that_are_missing_thin_or_absent_are_told():
     assert layers.y_plus == pytest.approx((600.0, 600.0, 600.0))  # the first centre is that of a cell of height 1
 
 
+def test_fewer_layers_spread_over_the_same_thickness_are_layers_with_a_tall_first_cell():
+    asked = 0.04 * 1.3 ** np.arange(6)
+    spread = np.array([1.0, 1.3]) * asked.sum() / 2.3
+    layers = layers_of(columns(stacked(spread, 1.0), "hull", asked), asked, 60.0 / asked[0])
+    assert (layers.obtained, layers.covered, layers.bare) == (2, 0.0, 0.0)
+    assert layers.thickness == pytest.approx(1.0)
+    assert layers.y_plus[1] == pytest.approx(60.0 * spread[0] / asked[0])
+
+
 def test_shares_are_of_area_and_not_of_faces():
     found = layers_of(Columns(np.array([3.0, 1.0]), np.array([0.1, 0.4]), np.array([2, 0]), np.array([0.3, 0.0])),
                       np.array([0.1, 0.2]), 1.0)  # fmt: skip
@@ -256,11 +268,12 @@ def test_faces_of_more_corners_are_measured_like_the_same_ones_of_four():
 
 def test_poor_layers_are_a_remark_with_the_limit_and_what_may_be_done(tmp_path):
     layers = {"covered": 0.55, "asked": 7, "y_plus": (60.0, 60.0, 533.0)}
-    measures = {"verdict": [], "layers": layers, "area": 1.0, "told": {"layers": 3.9}, "layers_by_face": 3.85}
+    measures = {"verdict": [], "layers": layers, "parts": {"hull": {**layers, "covered": 0.95}, "appendages": layers},
+                "area": 1.0, "told": {"layers": 3.9}, "layers_by_face": 3.85}  # fmt: skip
     (words,) = mesh_remarks(measures)
-    assert "55 % of the wall has the 7 layers asked for, limit 80 %; y+ reaches 533" in words
+    assert "55 % of the appendages has the 7 layers asked for, limit 80 %; y+ reaches 533" in words
     assert "fewer layers" in words
-    good = {**measures, "layers": {**layers, "covered": COVERED}}
+    good = {**measures, "parts": {"hull": {**layers, "covered": COVERED}}}
     assert mesh_remarks(good) == ()
     assert "says 6.5 layers, 3.85 are there" in mesh_remarks({**good, "told": {"layers": 6.5}})[0]
     assert "area" in mesh_remarks({**good, "area": 0.9})[0]
@@ -282,6 +295,7 @@ def test_a_coarse_surface_is_meshed_and_its_layers_are_there(tmp_path, monkeypat
     # 8 cells around half a circle of facets inscribed: chords of a tenth of a radian lose 0.2 % of area.
     assert mesh["area"] == pytest.approx(1.0, abs=0.01)
     layers = mesh["layers"]
+    assert mesh["parts"] == {"hull": layers}
     assert layers["covered"] > 0.95
     assert layers["y_plus"] == pytest.approx((60.0, 60.0, 60.0), rel=0.05)
     # The mesher counts by face what is counted here by walking through the cells.

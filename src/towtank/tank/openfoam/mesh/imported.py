@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.artefact import read_json, write_json
 from towtank.craft.craft import Craft
@@ -24,6 +25,7 @@ from towtank.provenance import digest
 from towtank.tank.openfoam.find import require
 from towtank.tank.openfoam.mesh.foam import read_mesh
 from towtank.tank.openfoam.mesh.layers import columns, layers_of
+from towtank.tank.openfoam.mesh.poly import Patch, PolyMesh
 from towtank.tank.openfoam.mesh.quality import quality
 from towtank.tank.openfoam.mesh.snappy import SnappySettings, dictionaries, told
 from towtank.tank.openfoam.mesh.snappy_run import make, meshing_time
@@ -41,6 +43,9 @@ part of the boundary layer, where a wall function takes the friction from the wr
 
 AREA = 0.03
 """Judgement: share by which the wall of the mesh may differ in area from the surface; friction goes with it."""
+
+BEYOND = 0.02
+"""Judgement: share of the diameter by which a face of the wall lies off the craft's hull when it is no part of it."""
 
 DOUBT = 0.1
 """Judgement: share of the layers asked for by which the count may differ from that of snappyHexMesh's log, which is
@@ -117,7 +122,7 @@ class SurfaceMesh:
     def _made(self, surface: Surface, store: Path, craft: Craft, speed: float) -> Path:
         """Folder of the mesh, made now where it is not there."""
         installation = require()
-        heights = self.settings.heights(craft, speed)
+        heights = self.settings.heights(craft, speed, surface.edges > 0)
         values = dictionaries(surface, craft, self.settings, heights)
         key = digest([surface.digest, values, f"{installation.version} {installation.kind}"])
         place = store / f"{self.label}-{key}"
@@ -185,11 +190,24 @@ def measured(folder: Path, surface: Surface, craft: Craft, speed: float, heights
         "cpu": meshing_time(log),
         "area": float(stacks.area.sum()) / surface.area,
         "layers": layers_of(stacks, heights, plate).document(),
+        "parts": {
+            name: layers_of(stacks.only(rows), heights, plate).document()
+            for name, rows in _parts(mesh, patch, craft).items()
+        },
         "layers_by_face": float(np.mean(stacks.count)),
         "told": dict(told(log)),
         "quality": asdict(found),
         "verdict": list(found.verdict()),
     }  # fmt: skip
+
+
+def _parts(mesh: PolyMesh, patch: Patch, craft: Craft) -> dict[str, NDArray[np.intp]]:
+    """Faces of the wall on the hull of ``craft``, and those beyond it: fins have few, which count for much."""
+    corners = mesh.faces[patch.start : patch.start + patch.count]
+    x, y, z = np.moveaxis(mesh.points[corners[:, :3]].mean(axis=1), -1, 0)
+    beyond = np.hypot(y, z) > craft.profile.radius(craft.origin_from_nose - x) + BEYOND * craft.diameter
+    rows = {"hull": np.flatnonzero(~beyond), "appendages": np.flatnonzero(beyond)}
+    return {name: found for name, found in rows.items() if len(found)}
 
 
 def measures_of(folder: Path) -> dict[str, Any]:
@@ -203,15 +221,15 @@ def mesh_remarks(measures: Mapping[str, Any]) -> tuple[str, ...]:
     if not measures:
         return ()
     out = [f"mesh: {words}" for words in measures["verdict"]]
-    layers = measures["layers"]
-    if layers["covered"] < COVERED:
-        out.append(
-            f"{100 * layers['covered']:.0f} % of the wall has the {layers['asked']} layers asked for, limit "
-            f"{100 * COVERED:.0f} %; y+ reaches {layers['y_plus'][2]:.0f} within 95 % of it: ask for fewer layers, or "
-            "more cells_across, or mend the surface where they are missing"
-        )
-    claim, found = measures["told"].get("layers"), measures["layers_by_face"]
-    if claim is not None and abs(claim - found) > DOUBT * max(layers["asked"], 1):
+    for part, layers in measures["parts"].items():
+        if layers["covered"] < COVERED:
+            out.append(
+                f"{100 * layers['covered']:.0f} % of the {part} has the {layers['asked']} layers asked for, limit "
+                f"{100 * COVERED:.0f} %; y+ reaches {layers['y_plus'][2]:.0f} within 95 % of it: ask for fewer layers, "
+                "or more cells_across, or mend the surface where they are missing"
+            )
+    claim, found, asked = measures["told"].get("layers"), measures["layers_by_face"], measures["layers"]["asked"]
+    if claim is not None and abs(claim - found) > DOUBT * max(asked, 1):
         out.append(f"snappyHexMesh says {claim:.3g} layers, {found:.3g} are there: trust neither, look at the mesh")
     if abs(measures["area"] - 1.0) > AREA:
         out.append(

@@ -12,9 +12,13 @@ from towtank.frames import Array
 from towtank.tank.openfoam.mesh.poly import Labels, PolyMesh
 from towtank.tank.openfoam.mesh.quality import cell_volumes, face_vectors
 
-TALLER = 1.5
-"""Judgement: a cell counts as a layer while it is at most this much taller than the layer asked for there. Cells above
-the layers are as tall as they are wide, several times that."""
+TALLER, FLAT = 1.5, 0.4
+"""Judgement: a cell counts as a layer while it is at most ``TALLER`` times as tall as the layer asked for there, or at
+most ``FLAT`` of the width of its face. snappyHexMesh spreads a stack of fewer layers over the thickness of all, so its
+cells are taller than asked and still layers; cells above the layers are about as tall as they are wide."""
+
+BEYOND = 1.2
+"""Judgement: share of the thickness asked for that layers may reach; a flat cell further off is one of the water."""
 
 THIN = 0.5
 """Judgement: a stack of layers counts as whole from this share of the thickness asked for on; below it its cells are
@@ -33,6 +37,10 @@ class Columns:
     first: Array
     count: Labels
     thickness: Array
+
+    def only(self, rows: NDArray[np.intp]) -> Columns:
+        """Those on the faces ``rows``."""
+        return Columns(self.area[rows], self.first[rows], self.count[rows], self.thickness[rows])
 
 
 @dataclass(frozen=True)
@@ -90,8 +98,8 @@ def layers_of(columns: Columns, heights: Array, y_plus: float) -> Layers:
 def columns(mesh: PolyMesh, wall: str, heights: Array) -> Columns:
     """Walk from each face of ``wall`` through the cells above it as long as they are layers, of ``heights`` (L,) [m].
 
-    A layer is a prism on the face below it: one face shares no point with that face and has as many corners, and its
-    height along the normal of the wall is at most ``TALLER`` times the one asked for there.
+    A layer is a prism on the face below it: one face shares no point with that face and has as many corners. Its height
+    along the normal of the wall is as ``TALLER``, ``FLAT`` and ``BEYOND`` say.
     """
     patch = mesh.patch(wall)
     faces = np.arange(patch.start, patch.start + patch.count)
@@ -105,11 +113,12 @@ def columns(mesh: PolyMesh, wall: str, heights: Array) -> Columns:
     count, thickness = np.zeros(len(faces), dtype=np.int64), np.zeros(len(faces))
     at = np.arange(len(faces))
     of_cell = _faces_of_cells(mesh)
+    width, most = np.sqrt(area), BEYOND * float(heights.sum())
     for height in heights:
         top = _opposite(mesh, of_cell, cell, faces)
         reach = np.einsum("fi,fi->f", centres[top] - foot[at], normal[at])
         step = reach - thickness[at]
-        good = (top >= 0) & (step > 0.0) & (step <= TALLER * height)
+        good = (top >= 0) & (step > 0.0) & (step <= np.maximum(TALLER * height, FLAT * width[at])) & (reach <= most)
         at, faces, below = at[good], top[good], cell[good]
         count[at] += 1
         thickness[at] = reach[good]

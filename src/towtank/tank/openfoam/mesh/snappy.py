@@ -46,7 +46,8 @@ class SnappySettings:
     cells_across : cells of the wall over the craft's diameter.   levels : halvings from the cubes of the base mesh to
     the cells of the wall.   fine : further halvings at sharp edges and where the wall bends strongly within a cell.
     buffer : cells between two levels.   y_plus : of the centre of the first layer.   expansion : from layer to layer.
-    layers : flat cells on the wall; None for as many as bring the last one to ``LAST`` of the width of the wall cells.
+    layers : flat cells on the wall; None for as many as bring the last one to ``LAST`` of the width of the cells of the
+    wall, of those at its edges where it has sharp ones: a stack thicker than these does not fit into the corners.
     far : half the width of the outer box [lengths].
     """
 
@@ -89,8 +90,8 @@ class SnappySettings:
         """Width [m] of the cells of the wall."""
         return craft.diameter / self.cells_across
 
-    def heights(self, craft: Craft, speed: float) -> Array:
-        """Heights [m] of the layers asked for, from the wall on, at ``speed`` [m/s].
+    def heights(self, craft: Craft, speed: float, sharp: bool = False) -> Array:
+        """Heights [m] of the layers asked for, from the wall on, at ``speed`` [m/s]; ``sharp`` : the wall has edges.
 
         Raises
         ------
@@ -100,7 +101,7 @@ class SnappySettings:
         first = first_cell(self.y_plus, speed, craft.length, craft.water.kinematic_viscosity)
         width = self.wall_cell(craft)
         if self.layers is None:
-            return _stack(first, self.expansion, LAST * width)
+            return _stack(first, self.expansion, width / (2**self.fine if sharp else 1))
         heights = first * self.expansion ** np.arange(self.layers)
         if self.layers and heights[-1] > width:
             raise InputError(
@@ -119,10 +120,10 @@ class SnappySettings:
         return int(faces * (1.0 * layers + 1.8 * self.buffer) + 30_000)
 
 
-def _stack(first: float, expansion: float, last: float) -> Array:
-    """Heights [m] from ``first`` on, the last one at most ``last``; none where the first is taller."""
+def _stack(first: float, expansion: float, width: float) -> Array:
+    """Heights [m] from ``first`` on up to ``LAST`` of ``width``, or the first alone; none if it exceeds the width."""
     heights = first * expansion ** np.arange(MOST_LAYERS if expansion > 1.0 else USUAL_LAYERS)
-    return np.asarray(heights[heights <= last])
+    return np.asarray(heights[heights <= max(LAST * width, min(first, width))])
 
 
 def dictionaries(surface: Surface, craft: Craft, settings: SnappySettings, heights: Array) -> dict[str, Any]:
