@@ -20,6 +20,8 @@ from typer.testing import CliRunner
 import towtank.tank.openfoam.find
 import towtank.tank.openfoam.tank
 from towtank.cli.app import app
+from towtank.craft.library import read_craft
+from towtank.craft.solid import write_stl
 from towtank.errors import TankError
 from towtank.report.study import read_study
 from towtank.tank.files import read_runs
@@ -224,6 +226,8 @@ def test_an_ended_campaign_leaves_no_solver_and_goes_on_from_its_files(tmp_path:
         (["--tank", "openfoam", "--quality", "superb"], "draft, standard, fine"),
         (["--tank", "openfoam", "--turbulence", "none"], "kOmegaSST"),
         (["--tank", "openfoam", "--refinement", "0.21"], "after refinement"),
+        (["--surface", "hull.stl"], "--tank openfoam"),
+        (["--tank", "openfoam", "--surface", "nowhere.stl"], "metres, body axes of the craft"),
         (["--only", "drfit"], "Kinds are drift, sway"),
     ],
 )
@@ -232,6 +236,19 @@ def test_what_the_tank_cannot_do_is_bad_input_with_the_remedy(tmp_path: Path, wo
     assert result.exit_code == 2, result.stderr
     assert told in result.stderr
     assert not list(tmp_path.glob("study/runs/*"))
+
+
+def test_a_surface_that_is_another_hull_or_has_to_turn_its_fins_is_refused_before_a_case_is_written(tmp_path: Path):
+    study, stl = tmp_path / "study", write_stl(read_craft("suboff-fins"), tmp_path / "fins.stl")
+    asked = ["--tank", "openfoam", "--surface", str(stl), "--out", str(study)]
+    result = _invoke("tow", "suboff-fins", *asked)
+    assert result.exit_code == 2, result.stderr
+    assert "turn fins" in result.stderr
+    assert "--only drift" in result.stderr
+    other = _invoke("tow", "hokie", *asked[:-1], str(tmp_path / "hokie"), "--only", "drift")
+    assert other.exit_code == 2, other.stderr
+    assert "is not where craft" in other.stderr
+    assert not list(tmp_path.glob("*/runs/*/case"))
 
 
 def test_without_openfoam_the_remedy_is_told_and_no_run_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

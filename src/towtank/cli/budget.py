@@ -46,11 +46,12 @@ def choose_tests(chain: Chain) -> None:
     wanted = towing.asked(chain)
     if not wanted["budget"] or wanted["only"]:
         return
-    tests = [test for test in chain.plan().tests if not test.exploratory]
-    costs = towing.openfoam(chain).schedule(chain.craft, tests).costs
+    tank = towing.openfoam(chain)
+    tests = [test for test in chain.plan().tests if not test.exploratory and tank.able(test)]
+    costs = tank.schedule(chain.craft, tests).costs
     price = dict(zip((test.name for test in tests), costs, strict=True))
     spare = float(wanted["budget"]) * towing.jobs(chain)
-    errors = [error.size for error in measured(towing.openfoam(chain).measured_as)]
+    errors = [error.size for error in measured(tank.measured_as)]
     alike = sum(errors) / len(errors) if errors else 0.0  # one model errs alike in all runs of a kind
     worth = choose(prior(chain), chain.craft, tests, lambda test: price[test.name], spare, doubt=DOUBT, alike=alike)
     if not worth:

@@ -28,6 +28,7 @@ def run(
     quality: towing.Quality = None,
     turbulence: towing.Turbulence = None,
     refinement: towing.Refinement = None,
+    surface: towing.Surface = None,
     only: towing.Only = None,
     jobs: towing.Jobs = None,
     time: towing.Budget = None,
@@ -52,7 +53,7 @@ def run(
             prepare(*PRELOADED)
         chain = open_chain(reply, craft, out, speed)
         spare = None if time is None else budget.seconds(time)
-        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs, spare)
+        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs, spare, surface)
         chain.prepare()
         chain.make_plan()
         budget.choose_tests(chain)

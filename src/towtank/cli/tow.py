@@ -30,6 +30,7 @@ def tow(
     quality: towing.Quality = None,
     turbulence: towing.Turbulence = None,
     refinement: towing.Refinement = None,
+    surface: towing.Surface = None,
     only: towing.Only = None,
     jobs: towing.Jobs = None,
     slurm: Slurm = None,
@@ -48,6 +49,8 @@ def tow(
 
     Example: towtank tow hokie --tank openfoam --only drift,sway --out hokie-rans
 
+    Example: towtank tow hokie --tank openfoam --surface hull.stl --only drift,turn --out hokie-hull
+
     Example: towtank tow hokie --tank openfoam --quality fine --slurm cluster.toml --out hokie-fine
     """
     with answering("tow", json, debug) as reply:
@@ -55,7 +58,7 @@ def tow(
         if cancel:
             towing.cancel(chain)
             return
-        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs)
+        towing.ask(chain, tank, quality, turbulence, refinement, only, jobs, surface=surface)
         chain.prepare()
         chain.make_plan()
         towing.elsewhere(chain, slurm)

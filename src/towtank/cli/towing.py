@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from towtank.tank.tank import Tank
 
 TANKS = ("fast", "openfoam")
-TOWING = {"tank": "fast", "quality": "", "turbulence": "", "refinement": "", "only": "", "budget": ""}
+TOWING = {"tank": "fast", "quality": "", "turbulence": "", "refinement": "", "surface": "", "only": "", "budget": ""}
 """What is asked of a tank that was asked for nothing else: the fast one, all tests. Empty: the tank's own choice."""
 
 TankName = Annotated[
@@ -42,6 +42,11 @@ Refinement = Annotated[
     float | None,
     typer.Option(metavar="R", help="Cells each way times R: meshes of one family. Default: 1.", show_default=False),
 ]
+Surface = Annotated[
+    str | None,
+    typer.Option("--surface", metavar="FILE", show_default=False,
+                 help="STL in place of hull and fins: metres, body axes of the craft. none: its own shape again."),
+]  # fmt: skip
 Only = Annotated[
     str | None,
     typer.Option(metavar="LIST", help='Kinds or names of tests: "drift,sway", "drift-p*", or "all".',
@@ -74,6 +79,7 @@ def ask(
     only: str | None = None,
     jobs: int | None = None,
     budget: float | None = None,
+    surface: str | None = None,
 ) -> None:
     """Take what the user says now, on top of what the study was asked before.
 
@@ -88,10 +94,13 @@ def ask(
     if tank is not None and tank != wanted["tank"]:
         wanted = TOWING | {"tank": tank, "only": wanted["only"]}
     shape = "" if refinement is None else f"{refinement:.12g}"
-    given = {"quality": quality or "", "turbulence": turbulence or "", "refinement": shape}
+    given = {"quality": quality or "", "turbulence": turbulence or "", "refinement": shape, "surface": surface or ""}
     stray = [name for name, value in (given | {"jobs": "" if jobs is None else str(jobs)}).items() if value]
     if stray and wanted["tank"] == "fast":
         raise InputError(f"--{stray[0]} is for --tank openfoam; the fast tank has no such setting. Leave it out.")
+    if surface is not None:
+        own = surface.strip() == "none"
+        given["surface"], wanted = "" if own else str(Path(surface).resolve()), wanted | {"surface": ""}
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs {jobs}: at least one case has to run. Leave it out for one a core.")
     if only is not None:
@@ -120,12 +129,15 @@ def tank(chain: Chain) -> Tank:
 
 def openfoam(chain: Chain) -> OpenFoamTank:
     """The OpenFOAM tank as it is asked for."""
+    from towtank.tank.openfoam.mesh.grid import MeshSettings
     from towtank.tank.openfoam.tank import OpenFoamTank
 
     wanted = asked(chain)
-    chosen: dict[str, Any] = {name: wanted[name] for name in ("quality", "turbulence") if wanted[name]}
+    chosen: dict[str, Any] = {name: wanted[name] for name in ("quality", "turbulence", "surface") if wanted[name]}
     tank = OpenFoamTank(**chosen, refinement=float(wanted["refinement"] or 1.0))
-    _ = tank.solution, tank.mesh_settings.counts()
+    _, mesh = tank.solution, tank.mesh_settings
+    if isinstance(mesh, MeshSettings):
+        mesh.counts()
     return tank
 
 

@@ -32,6 +32,7 @@ from towtank.tank.openfoam.formulation import (
     formulation_of,
 )
 from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
+from towtank.tank.openfoam.mesh.imported import WALL, SurfaceMesh
 from towtank.tank.openfoam.mesh.poly import PolyMesh, write_mesh
 from towtank.tank.openfoam.motion import Timeline, motion_table, pose, timeline, travelled
 from towtank.tank.openfoam.numerics import MODELS, Numerics
@@ -101,7 +102,7 @@ def write_case(
     folder: Path,
     craft: Craft,
     test: CaptiveTest,
-    mesh_settings: MeshSettings,
+    mesh_settings: MeshSettings | SurfaceMesh,
     numerics: Numerics,
     ranks: int = 1,
     start_from: Path | None = None,
@@ -146,16 +147,28 @@ def write_case(
 
 
 def _meshed(
-    folder: Path, craft: Craft, test: CaptiveTest, mesh_settings: MeshSettings, numerics: Numerics, ranks: int
+    folder: Path,
+    craft: Craft,
+    test: CaptiveTest,
+    mesh_settings: MeshSettings | SurfaceMesh,
+    numerics: Numerics,
+    ranks: int,
 ) -> Case:
     """The case, of which only the mesh is written yet."""
     domain = domain_of(craft, test, mesh_settings.half)
     formulation = formulation_of(test, domain, craft.length, unsteady=numerics.travel > 0.0)
-    angles = test.fins or (0.0,) * len(craft.fins)
     # One mesh for all tests at a speed; only where there is hardly a tow does the motion set the first cell.
     speed = fastest(test, craft.length) if isinstance(formulation, StillWater) else test.speed
-    mesh = mesh_of(domain.craft_in_mesh(craft), mesh_settings, half=domain.half, fins=angles, speed=speed)
-    write_mesh(mesh, folder)
+    if isinstance(mesh_settings, SurfaceMesh):
+        walls: tuple[str, ...] = (WALL,)
+        label = mesh_settings.label
+        cells, name = mesh_settings.write(folder, craft, test, speed)
+    else:
+        angles = test.fins or (0.0,) * len(craft.fins)
+        mesh = mesh_of(domain.craft_in_mesh(craft), mesh_settings, half=domain.half, fins=angles, speed=speed)
+        write_mesh(mesh, folder)
+        walls = tuple(patch.name for patch in mesh.patches if patch.kind == "wall")
+        cells, label, name = mesh.cells, label_of(mesh_settings), _hash(mesh)
     return Case(
         folder=folder,
         test=test,
@@ -164,10 +177,10 @@ def _meshed(
         domain=domain,
         numerics=numerics,
         line=_line(formulation, test, craft.length, numerics),
-        walls=tuple(patch.name for patch in mesh.patches if patch.kind == "wall"),
-        cells=mesh.cells,
-        label=label_of(mesh_settings),
-        mesh=_hash(mesh),
+        walls=walls,
+        cells=cells,
+        label=label,
+        mesh=name,
         length=craft.length,
         density=craft.water.density,
         ranks=ranks,
@@ -183,8 +196,10 @@ def _line(formulation: Formulation, test: CaptiveTest, length: float, numerics: 
 
 def label_of(settings: MeshSettings) -> str:
     """Name of a mesh of a family: its counts, y+ and refinement."""
-    return f"{settings.along}x{settings.out}x{settings.around}-y{settings.y_plus:g}" + (
-        f"-r{settings.refinement:.4g}" if settings.refinement != 1.0 else ""
+    return (
+        f"{settings.along}x{settings.out}x{settings.around}-y{settings.y_plus:g}"
+        + (f"-c{settings.chord}" if settings.chord else "")
+        + (f"-r{settings.refinement:.4g}" if settings.refinement != 1.0 else "")
     )
 
 

@@ -11,6 +11,7 @@ from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import sampled
 from towtank.tank.openfoam.case import Case
 from towtank.tank.openfoam.health import health_of, remarks
+from towtank.tank.openfoam.mesh.imported import measures_of, mesh_remarks
 from towtank.tank.openfoam.motion import inertial_to_body, pose
 from towtank.tank.openfoam.runner import Outcome, measured
 from towtank.tank.record import record
@@ -32,6 +33,7 @@ def run_of(case: Case, craft: Craft, test: CaptiveTest, tank: Tank, outcome: Out
     loads = case_loads(case)
     health = health_of(case, outcome, loads)
     history = sampled(test)
+    measures = measures_of(case.folder)
     parts: dict[str, Array] = {}
     if len(case.walls) > 1:
         hull = case_loads(case, "forcesHull")
@@ -43,8 +45,8 @@ def run_of(case: Case, craft: Craft, test: CaptiveTest, tank: Tank, outcome: Out
         history,
         _held(case, loads, len(history.time)),
         parts=parts,
-        flags=remarks(case, health),
-        mesh={"label": case.label, "cells": case.cells, "dimensions": VOLUME},
+        flags=(*remarks(case, health), *mesh_remarks(measures)),
+        mesh={"label": case.label, "cells": case.cells, "dimensions": VOLUME, **measures},
         health=health.document(),
         case={
             "formulation": case.formulation.word,

@@ -17,6 +17,7 @@ from towtank.plan.kinds import CaptiveTest
 from towtank.tank.openfoam.case import read_case
 from towtank.tank.openfoam.formulation import domain_of
 from towtank.tank.openfoam.mesh.grid import MeshSettings
+from towtank.tank.openfoam.mesh.imported import SurfaceMesh
 from towtank.tank.openfoam.motion import timeline
 from towtank.tank.openfoam.numerics import Numerics
 from towtank.tank.openfoam.runner import SCHEMA as OUTCOME
@@ -67,13 +68,17 @@ def pace_of(out: Path) -> Pace:
     )
 
 
-def cells_of(craft: Craft, test: CaptiveTest, settings: MeshSettings) -> int:
-    """Cells of the mesh of a test, within a few per cent, without making it."""
+def cells_of(craft: Craft, test: CaptiveTest, settings: MeshSettings | SurfaceMesh) -> int:
+    """Cells of the mesh of a test, within a few per cent, without making it; about a surface within a third."""
+    if isinstance(settings, SurfaceMesh):
+        return settings.settings.estimate(craft)
     along, around, out = settings.counts()
     return along * around * out * (1 if domain_of(craft, test, settings.half).half else 2)
 
 
-def schedule(craft: Craft, tests: Sequence[CaptiveTest], mesh: MeshSettings, numerics: Numerics) -> Schedule:
+def schedule(
+    craft: Craft, tests: Sequence[CaptiveTest], mesh: MeshSettings | SurfaceMesh, numerics: Numerics
+) -> Schedule:
     """Chains of straight runs on one mesh, from the smallest angle outwards to either side; all others stand alone."""
     chains: dict[object, list[tuple[float, int]]] = defaultdict(list)
     for number, test in enumerate(tests):

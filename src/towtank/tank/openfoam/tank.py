@@ -23,6 +23,9 @@ from towtank.tank.openfoam.errors import with_model_form
 from towtank.tank.openfoam.find import require
 from towtank.tank.openfoam.formulation import Straight, domain_of
 from towtank.tank.openfoam.mesh.grid import MeshSettings
+from towtank.tank.openfoam.mesh.imported import SurfaceMesh
+from towtank.tank.openfoam.mesh.snappy import SnappySettings
+from towtank.tank.openfoam.mesh.stl import file_digest
 from towtank.tank.openfoam.numerics import Numerics
 from towtank.tank.openfoam.read import run_of
 from towtank.tank.openfoam.runner import solve
@@ -47,7 +50,7 @@ PRESETS: dict[str, tuple[MeshSettings, Numerics]] = {
 
 @dataclass(frozen=True)
 class OpenFoamTank:
-    """RANS on a structured mesh, run by OpenFOAM on this machine.
+    """RANS run by OpenFOAM on this machine: on a structured mesh of the craft, or about an imported surface.
 
     quality : a key of ``PRESETS``.   turbulence : model in its place, a key of ``numerics.MODELS``.
     refinement : factor on the cells each way: meshes of one family.   cores : processes of one case.
@@ -55,6 +58,7 @@ class OpenFoamTank:
     where : study folder; cases lie in ``runs/<id>/case``. Without it they are made in a temporary folder and removed.
     from_neighbour : straight runs start from the nearest one that is solved on the same mesh, where there is one.
     stop : when it is set, the run under way ends; its files stay.
+    surface : STL file in place of hull and fins, in metres, body axes, about the body origin.   snappy : its mesh.
     """
 
     quality: str = "draft"
@@ -66,6 +70,8 @@ class OpenFoamTank:
     where: Path | None = None
     from_neighbour: bool = True
     stop: threading.Event | None = field(default=None, compare=False, repr=False)
+    surface: Path | str | None = None
+    snappy: SnappySettings | None = None
 
     def __post_init__(self) -> None:
         if self.quality not in PRESETS:
@@ -77,6 +83,13 @@ class OpenFoamTank:
                 f"OpenFoamTank: refinement {self.refinement:g} is outside 0.2 to 8. Below it the mesh loses the hull, "
                 "above it it has 500 times the cells. Give a number near 1."
             )
+        if self.surface is not None and self.mesh is not None:
+            raise InputError(
+                "OpenFoamTank: mesh sets the structured mesh of the craft's own hull, and a surface is meshed by "
+                "snappy = SnappySettings(...). Give one of them."
+            )
+        if self.surface is None and self.snappy is not None:
+            raise InputError('OpenFoamTank: snappy is for a surface, and none is given. Add surface = "hull.stl".')
 
     @property
     def level(self) -> str:
@@ -84,8 +97,13 @@ class OpenFoamTank:
         return LEVEL
 
     @property
-    def mesh_settings(self) -> MeshSettings:
-        """Mesh of the preset or as given, refined."""
+    def mesh_settings(self) -> MeshSettings | SurfaceMesh:
+        """Mesh of the preset or as given, refined; about the surface where there is one."""
+        if self.surface is not None:
+            path = Path(self.surface)
+            store = None if self.where is None else Path(self.where) / "meshes"
+            settings = (self.snappy or SnappySettings()).refined(self.refinement)
+            return SurfaceMesh(path, file_digest(path), settings, store, self.stop)
         chosen = PRESETS[self.quality][0] if self.mesh is None else self.mesh
         return replace(chosen, refinement=chosen.refinement * self.refinement)
 
@@ -98,17 +116,17 @@ class OpenFoamTank:
     @property
     def measured_as(self) -> str:
         """The preset whose measured errors hold; empty when something in it was changed."""
-        changed = self.turbulence or self.mesh or self.numerics or self.refinement != 1.0
+        changed = self.turbulence or self.mesh or self.numerics or self.surface or self.refinement != 1.0
         return "" if changed else self.quality
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides the result beside craft and test. Cores and folders do not."""
-        installation = require()
+        installation, mesh = require(), self.mesh_settings
         return {
             "tank": "openfoam",
             "physics": PHYSICS,
             "quality": self.quality,
-            "mesh": asdict(self.mesh_settings),
+            "mesh": mesh.identity() if isinstance(mesh, SurfaceMesh) else asdict(mesh),
             "numerics": asdict(self.solution),
             "openfoam": f"{installation.version} {installation.kind}",
         }
@@ -122,8 +140,20 @@ class OpenFoamTank:
         return replace(self, stop=stop)
 
     def schedule(self, craft: Craft, tests: Sequence[CaptiveTest]) -> Schedule:
-        """Order of a campaign in this tank: straight runs go on from their neighbours."""
+        """Order of a campaign in this tank: straight runs go on from their neighbours.
+
+        Raises
+        ------
+        InputError
+            The surface is not the craft, or a test cannot be run about it.
+        """
+        if isinstance(self.mesh_settings, SurfaceMesh):
+            self.mesh_settings.check(craft, tests)
         return schedule(craft, tests, self.mesh_settings, self.solution)
+
+    def able(self, test: CaptiveTest) -> bool:
+        """False for a test that turns fins when they are part of a surface."""
+        return self.surface is None or not any(test.fins)
 
     def run(self, craft: Craft, test: CaptiveTest, progress: Progress) -> Run:
         """Run one captive test: write its case, or go on with the one on file, solve and read it.
@@ -135,7 +165,12 @@ class OpenFoamTank:
         """
         installation = require()
         with self._folder(craft, test) as folder:
-            case = self._case(folder, craft, test)
+            task = f"mesh {test.name}"
+            progress.start(task, 1)
+            try:
+                case = self._case(folder, craft, test)
+            finally:
+                progress.done(task)
             case, outcome = solve(case, installation, progress, stop=self.stop)
             return with_model_form(run_of(case, craft, test, self, outcome), self.measured_as)
 

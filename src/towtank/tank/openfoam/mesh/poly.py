@@ -33,6 +33,8 @@ class Patch:
 class PolyMesh:
     """Points (P, 3) [m] and faces (F, 4) of point labels; -1 closes a triangle.
 
+    A mesh read from elsewhere may have wider rows, for faces of more corners; such a one is measured, not written.
+
     ``owner`` (F,): the cell a face belongs to; ``neighbour`` (I,): the other cell of the first I faces.
     """
 

@@ -59,17 +59,20 @@ class Quality:
 
 def face_vectors(mesh: PolyMesh) -> tuple[Array, Array]:
     """Centres (F, 3) [m] and area vectors (F, 3) [m2] of the faces, from triangles about the mean of the corners."""
-    third = mesh.faces[:, 3] < 0
-    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    nodes = mesh.points[corners]
-    middle = np.where(third[:, None], nodes[:, :3].mean(axis=1), nodes.mean(axis=1))
-    following = np.roll(nodes, -1, axis=1)
-    triangles = 0.5 * np.cross(following - nodes, middle[:, None] - nodes)
-    area = triangles.sum(axis=1)
-    size = np.linalg.norm(triangles, axis=2)
-    centres = (nodes + following + middle[:, None]) / 3.0
-    mean = (size[..., None] * centres).sum(axis=1) / np.maximum(size.sum(axis=1), _TINY)[:, None]
-    return np.where(third[:, None], middle, mean), area
+    count = (mesh.faces >= 0).sum(axis=1)
+    centre, area = np.empty((len(count), 3)), np.empty((len(count), 3))
+    for corners in np.unique(count):
+        rows = np.flatnonzero(count == corners)
+        nodes = mesh.points[mesh.faces[rows, :corners]]
+        middle = nodes.mean(axis=1)
+        following = np.roll(nodes, -1, axis=1)
+        triangles = 0.5 * np.cross(following - nodes, middle[:, None] - nodes)
+        size = np.linalg.norm(triangles, axis=2)
+        thirds = (nodes + following + middle[:, None]) / 3.0
+        mean = (size[..., None] * thirds).sum(axis=1) / np.maximum(size.sum(axis=1), _TINY)[:, None]
+        area[rows] = triangles.sum(axis=1)
+        centre[rows] = middle if corners == 3 else mean
+    return centre, area
 
 
 def cell_volumes(mesh: PolyMesh, centres: Array, area: Array) -> tuple[Array, Array]:
