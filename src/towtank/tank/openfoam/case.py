@@ -24,13 +24,16 @@ from towtank.tank.openfoam.formulation import (
     Domain,
     Formulation,
     Moving,
+    Overset,
     StillWater,
     Straight,
     domain_of,
     fastest,
     formulation_of,
+    overset_of,
 )
 from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
+from towtank.tank.openfoam.mesh.overset import overset_mesh, write_zones
 from towtank.tank.openfoam.mesh.poly import PolyMesh, write_mesh
 from towtank.tank.openfoam.motion import Timeline, motion_table, pose, timeline
 from towtank.tank.openfoam.numerics import MODELS, Numerics
@@ -42,6 +45,14 @@ WRITE_EVERY = 100
 
 WRITES_PER_PERIOD = 4
 """Times on file in a period of a moving case."""
+
+OVERSET_FIELD = """
+// Merged with the patches above: the rims of the two meshes take their values from each other.
+boundaryField
+{
+    overset         { type overset; value $internalField; }
+}
+"""
 
 MARGIN_OF_TIME = 60.0
 """The control dictionary is dated this much back [s]: the solver takes a change of it for one only when it is 10 s
@@ -98,17 +109,19 @@ def write_case(
     numerics: Numerics,
     ranks: int = 1,
     start_from: Path | None = None,
+    overset: bool = False,
 ) -> Case:
     """Write the case of ``test`` into ``folder``; it appears whole or not at all.
 
     start_from : a finished steady case on the same mesh, whose last fields are the first of this one.
+    overset : the body's mesh moves in a fixed one, instead of all of it in the stream.
 
     Raises
     ------
     ArtefactError
         The folder is not empty, or cannot be written.
     TankError
-        The mesh, or the fields to start from, do not fit.
+        The mesh, or the fields to start from, do not fit; the test has no overset formulation.
     """
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
@@ -120,7 +133,7 @@ def write_case(
     try:
         shutil.rmtree(part, ignore_errors=True)
         part.mkdir(parents=True)
-        case = _meshed(part, craft, test, mesh_settings, numerics, ranks)
+        case = _meshed(part, craft, test, mesh_settings, numerics, ranks, overset)
         _write_text(case, craft)
         if start_from is not None:
             case = replace(case, start=_start(case, start_from))
@@ -139,15 +152,31 @@ def write_case(
 
 
 def _meshed(
-    folder: Path, craft: Craft, test: CaptiveTest, mesh_settings: MeshSettings, numerics: Numerics, ranks: int
+    folder: Path,
+    craft: Craft,
+    test: CaptiveTest,
+    mesh_settings: MeshSettings,
+    numerics: Numerics,
+    ranks: int,
+    overset: bool,
 ) -> Case:
     """The case, of which only the mesh is written yet."""
     domain = domain_of(craft, test, mesh_settings.half)
     formulation = formulation_of(test, domain, craft.length)
+    line = None if test.motion.period == 0.0 else timeline(test, numerics.steps, numerics.ramp)
     angles = test.fins or (0.0,) * len(craft.fins)
     # One mesh for all tests at a speed; only where there is hardly a tow does the motion set the first cell.
     speed = fastest(test, craft.length) if isinstance(formulation, StillWater) else test.speed
-    mesh = mesh_of(domain.craft_in_mesh(craft), mesh_settings, half=domain.half, fins=angles, speed=speed)
+    in_mesh = domain.craft_in_mesh(craft)
+    if overset:
+        formulation = overset_of(test, formulation)
+        assert line is not None  # the line above refuses what does not oscillate
+        poses = pose(test, domain, formulation, line)[1:]
+        pair = overset_mesh(in_mesh, mesh_settings, poses, half=domain.half, fins=angles, speed=speed)
+        write_zones(folder, pair)
+        mesh = pair.mesh
+    else:
+        mesh = mesh_of(in_mesh, mesh_settings, half=domain.half, fins=angles, speed=speed)
     write_mesh(mesh, folder)
     return Case(
         folder=folder,
@@ -156,10 +185,10 @@ def _meshed(
         formulation=formulation,
         domain=domain,
         numerics=numerics,
-        line=None if test.motion.period == 0.0 else timeline(test, numerics.steps, numerics.ramp),
+        line=line,
         walls=tuple(patch.name for patch in mesh.patches if patch.kind == "wall"),
         cells=mesh.cells,
-        label=label_of(mesh_settings),
+        label=label_of(mesh_settings) + ("-overset" if overset else ""),
         mesh=_hash(mesh),
         length=craft.length,
         density=craft.water.density,
@@ -195,8 +224,11 @@ def _write_text(case: Case, craft: Craft) -> None:
     )
     values = context(case, craft.water.kinematic_viscosity)
     for name in template_names(case):
+        inside = name.partition("/")[2]
         text = engine.get_template(name).render(values)
-        write_text(case.folder / name.partition("/")[2], text)
+        if isinstance(case.formulation, Overset) and inside.startswith("0/"):
+            text += OVERSET_FIELD
+        write_text(case.folder / inside, text)
     write_motion(case)
     control = case.folder / "system" / "controlDict"
     back = time.time() - MARGIN_OF_TIME
@@ -344,7 +376,7 @@ def _case(folder: Path, document: Mapping[str, Any]) -> Case:
     test = dict(document["test"])
     motion = test.pop("motion")
     test["fins"] = tuple(test["fins"])
-    words: dict[str, Any] = {kind.word: kind for kind in (Straight, Arm, Moving, StillWater)}
+    words: dict[str, Any] = {kind.word: kind for kind in (Straight, Arm, Moving, StillWater, Overset)}
     kinds: Mapping[str, Any] = KINDS
     formulation = document["formulation"]
     values = {key: tuple(v) if isinstance(v, list) else v for key, v in formulation["values"].items()}

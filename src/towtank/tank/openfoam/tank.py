@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -53,6 +53,8 @@ class OpenFoamTank:
     refinement : factor on the cells each way: meshes of one family.   cores : processes of one case.
     mesh, numerics : settings in place of the preset's.
     where : study folder; cases lie in ``runs/<id>/case``. Without it they are made in a temporary folder and removed.
+    formulation : "own" is chosen for each test; "overset" moves the body's mesh in a fixed one, for oscillations only,
+    to compare with sources that do so.
     from_neighbour : straight runs start from the nearest one that is solved on the same mesh, where there is one.
     stop : when it is set, the run under way ends; its files stay.
     """
@@ -64,6 +66,7 @@ class OpenFoamTank:
     mesh: MeshSettings | None = None
     numerics: Numerics | None = None
     where: Path | None = None
+    formulation: Literal["own", "overset"] = "own"
     from_neighbour: bool = True
     stop: threading.Event | None = field(default=None, compare=False, repr=False)
 
@@ -76,6 +79,17 @@ class OpenFoamTank:
             raise InputError(
                 f"OpenFoamTank: refinement {self.refinement:g} is outside 0.2 to 8. Below it the mesh loses the hull, "
                 "above it it has 500 times the cells. Give a number near 1."
+            )
+
+        if self.formulation not in ("own", "overset"):
+            raise InputError(
+                f'OpenFoamTank: formulation {self.formulation!r} is not known. Give "overset", or leave it at "own", '
+                "which is chosen for each test."
+            )
+        if self.formulation == "overset" and self.cores > 1:
+            raise InputError(
+                f"OpenFoamTank: overset on {self.cores} cores was never tried. Give cores = 1; several tests can run "
+                "side by side."
             )
 
     @property
@@ -98,7 +112,7 @@ class OpenFoamTank:
     @property
     def measured_as(self) -> str:
         """The preset whose measured errors hold; empty when something in it was changed."""
-        changed = self.turbulence or self.mesh or self.numerics or self.refinement != 1.0
+        changed = self.turbulence or self.mesh or self.numerics or self.refinement != 1.0 or self.formulation != "own"
         return "" if changed else self.quality
 
     def settings(self) -> dict[str, Any]:
@@ -111,6 +125,7 @@ class OpenFoamTank:
             "mesh": asdict(self.mesh_settings),
             "numerics": asdict(self.solution),
             "openfoam": f"{installation.version} {installation.kind}",
+            **({} if self.formulation == "own" else {"formulation": self.formulation}),
         }
 
     def below(self, study: Path) -> OpenFoamTank:
@@ -154,11 +169,12 @@ class OpenFoamTank:
                 return read_case(folder)
             except ArtefactError:
                 shutil.rmtree(folder)
-        start = self._neighbour(craft, test) if self.from_neighbour else None
+        overset = self.formulation == "overset"
+        start = self._neighbour(craft, test) if self.from_neighbour and not overset else None
         if start is not None:
             with suppress(TankError):  # solved on another mesh, or its fields are gone: the uniform flow serves
                 return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, start)
-        return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores)
+        return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, overset=overset)
 
     def _neighbour(self, craft: Craft, test: CaptiveTest) -> Path | None:
         """The solved straight case of the same mesh whose inflow is nearest."""
