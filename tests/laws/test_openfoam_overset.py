@@ -17,7 +17,7 @@ from towtank.tank.openfoam.case import read_case, write_case
 from towtank.tank.openfoam.formulation import Overset
 from towtank.tank.openfoam.mesh.grid import MeshSettings
 from towtank.tank.openfoam.mesh.meridian import outline
-from towtank.tank.openfoam.mesh.overset import PATCH, overset_mesh, radius_of
+from towtank.tank.openfoam.mesh.overset import PATCH, layout, overset_mesh, radius_of
 from towtank.tank.openfoam.mesh.quality import cell_volumes, face_vectors, quality
 from towtank.tank.openfoam.tank import OpenFoamTank
 
@@ -66,11 +66,12 @@ def test_a_cell_at_either_rim_lies_well_inside_the_other_mesh_through_the_whole_
 
 
 def test_the_cavity_grows_with_the_motion_until_the_far_field_is_reached():
-    small, large = (overset_mesh(CRAFT, MESH, _swayed(share * L), half=True).layout for share in (0.04, 0.08))
+    shape = outline(CRAFT.profile, MESH.far * L)
+    small, large = (layout(CRAFT, shape, MESH, _swayed(share * L)) for share in (0.05, 0.2))
     assert small.cavity < large.cavity
     assert small.fringe < large.fringe
     with pytest.raises(TankError, match="smaller amplitude"):
-        overset_mesh(CRAFT, MESH, _swayed(1.0 * L), half=True)
+        layout(CRAFT, shape, MESH, _swayed(1.0 * L))
 
 
 def test_an_overlap_of_less_than_a_cell_is_refused():
