@@ -116,7 +116,7 @@ def test_a_case_says_which_cells_move_and_reads_back(tmp_path):
 
 
 def test_a_sway_in_an_overset_mesh_has_the_harmonics_of_the_mesh_that_moves_as_a_whole():
-    """At 96 steps a period the Courant number is 7; at twice that the overset case diverges."""
+    """At 96 steps a period the Courant number is 7; overset cases diverged at twice that."""
     coarse, numerics = MeshSettings(along=24, around=8, out=16), replace(QUICK, steps=96)
     moving, overset = (
         OpenFoamTank(mesh=coarse, numerics=numerics, formulation=word).run(CRAFT, SWAY, Silent())
