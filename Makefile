@@ -72,6 +72,7 @@ validate-slurm: $(VENV)/.engine $(VENV)/.tools
 validate-openfoam: $(VENV)/.tools
 	$(BIN)/python validation/openfoam_suboff.py
 	$(BIN)/python validation/openfoam_grid.py
+	$(BIN)/python validation/openfoam_overset.py
 
 bench: $(VENV)/.engine
 	$(BIN)/python benchmarks/bench.py

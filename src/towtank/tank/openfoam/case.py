@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 import time
@@ -10,8 +9,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from towtank.artefact import read_json, write_json, write_text
 from towtank.craft.craft import Craft
@@ -24,16 +21,18 @@ from towtank.tank.openfoam.formulation import (
     Domain,
     Formulation,
     Moving,
+    Overset,
     StillWater,
     Straight,
     Unsteady,
     domain_of,
     fastest,
     formulation_of,
+    overset_of,
 )
-from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
-from towtank.tank.openfoam.mesh.imported import WALL, SurfaceMesh
-from towtank.tank.openfoam.mesh.poly import PolyMesh, write_mesh
+from towtank.tank.openfoam.mesh.grid import MeshSettings
+from towtank.tank.openfoam.mesh.imported import SurfaceMesh
+from towtank.tank.openfoam.meshing import write_case_mesh
 from towtank.tank.openfoam.motion import Timeline, motion_table, pose, timeline, travelled
 from towtank.tank.openfoam.numerics import MODELS, Numerics
 
@@ -44,6 +43,14 @@ WRITE_EVERY = 100
 
 WRITES_PER_PERIOD = 4
 """Times on file in a period of a moving case."""
+
+OVERSET_FIELD = """
+// Merged with the patches above: the rims of the two meshes take their values from each other.
+boundaryField
+{
+    overset         { type overset; value $internalField; }
+}
+"""
 
 MARGIN_OF_TIME = 60.0
 """The control dictionary is dated this much back [s]: the solver takes a change of it for one only when it is 10 s
@@ -106,17 +113,19 @@ def write_case(
     numerics: Numerics,
     ranks: int = 1,
     start_from: Path | None = None,
+    overset: bool = False,
 ) -> Case:
     """Write the case of ``test`` into ``folder``; it appears whole or not at all.
 
     start_from : a finished steady case on the same mesh, whose last fields are the first of this one.
+    overset : the body's mesh moves in a fixed one, instead of all of it in the stream.
 
     Raises
     ------
     ArtefactError
         The folder is not empty, or cannot be written.
     TankError
-        The mesh, or the fields to start from, do not fit.
+        The mesh, or the fields to start from, do not fit; the test has no overset formulation.
     """
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
@@ -128,7 +137,7 @@ def write_case(
     try:
         shutil.rmtree(part, ignore_errors=True)
         part.mkdir(parents=True)
-        case = _meshed(part, craft, test, mesh_settings, numerics, ranks)
+        case = _meshed(part, craft, test, mesh_settings, numerics, ranks, overset)
         _write_text(case, craft)
         if start_from is not None:
             case = replace(case, start=_start(case, start_from))
@@ -153,22 +162,14 @@ def _meshed(
     mesh_settings: MeshSettings | SurfaceMesh,
     numerics: Numerics,
     ranks: int,
+    overset: bool,
 ) -> Case:
     """The case, of which only the mesh is written yet."""
     domain = domain_of(craft, test, mesh_settings.half)
     formulation = formulation_of(test, domain, craft.length, unsteady=numerics.travel > 0.0)
-    # One mesh for all tests at a speed; only where there is hardly a tow does the motion set the first cell.
-    speed = fastest(test, craft.length) if isinstance(formulation, StillWater) else test.speed
-    if isinstance(mesh_settings, SurfaceMesh):
-        walls: tuple[str, ...] = (WALL,)
-        label = mesh_settings.label
-        cells, name = mesh_settings.write(folder, craft, test, speed)
-    else:
-        angles = test.fins or (0.0,) * len(craft.fins)
-        mesh = mesh_of(domain.craft_in_mesh(craft), mesh_settings, half=domain.half, fins=angles, speed=speed)
-        write_mesh(mesh, folder)
-        walls = tuple(patch.name for patch in mesh.patches if patch.kind == "wall")
-        cells, label, name = mesh.cells, label_of(mesh_settings), _hash(mesh)
+    if overset:
+        formulation = overset_of(test, formulation)
+    line = _line(formulation, test, craft.length, numerics)
     return Case(
         folder=folder,
         test=test,
@@ -176,11 +177,8 @@ def _meshed(
         formulation=formulation,
         domain=domain,
         numerics=numerics,
-        line=_line(formulation, test, craft.length, numerics),
-        walls=walls,
-        cells=cells,
-        label=label,
-        mesh=name,
+        line=line,
+        **vars(write_case_mesh(folder, craft, test, mesh_settings, domain, formulation, line)),
         length=craft.length,
         density=craft.water.density,
         ranks=ranks,
@@ -192,19 +190,6 @@ def _line(formulation: Formulation, test: CaptiveTest, length: float, numerics: 
     if isinstance(formulation, Unsteady):
         return travelled(test.speed, length, numerics.travel, numerics.steps)
     return timeline(test, numerics.steps, numerics.ramp) if test.motion.period else None
-
-
-def label_of(settings: MeshSettings) -> str:
-    """Name of a mesh of a family: its counts, y+ and refinement."""
-    return (
-        f"{settings.along}x{settings.out}x{settings.around}-y{settings.y_plus:g}"
-        + (f"-c{settings.chord}" if settings.chord else "")
-        + (f"-r{settings.refinement:.4g}" if settings.refinement != 1.0 else "")
-    )
-
-
-def _hash(mesh: PolyMesh) -> str:
-    return hashlib.sha256(np.round(mesh.points, 9).tobytes()).hexdigest()[:16]
 
 
 def write_motion(case: Case) -> None:
@@ -224,8 +209,11 @@ def _write_text(case: Case, craft: Craft) -> None:
     )
     values = context(case, craft.water.kinematic_viscosity)
     for name in template_names(case):
+        inside = name.partition("/")[2]
         text = engine.get_template(name).render(values)
-        write_text(case.folder / name.partition("/")[2], text)
+        if isinstance(case.formulation, Overset) and inside.startswith("0/"):
+            text += OVERSET_FIELD
+        write_text(case.folder / inside, text)
     write_motion(case)
     control = case.folder / "system" / "controlDict"
     back = time.time() - MARGIN_OF_TIME
@@ -374,7 +362,7 @@ def _case(folder: Path, document: Mapping[str, Any]) -> Case:
     test = dict(document["test"])
     motion = test.pop("motion")
     test["fins"] = tuple(test["fins"])
-    words: dict[str, Any] = {kind.word: kind for kind in (Straight, Unsteady, Arm, Moving, StillWater)}
+    words: dict[str, Any] = {kind.word: kind for kind in (Straight, Unsteady, Arm, Moving, StillWater, Overset)}
     kinds: Mapping[str, Any] = KINDS
     formulation = document["formulation"]
     values = {key: tuple(v) if isinstance(v, list) else v for key, v in formulation["values"].items()}

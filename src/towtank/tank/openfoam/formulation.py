@@ -80,7 +80,21 @@ class StillWater:
     templates = ("common", "unsteady", "still")
 
 
-Formulation = Straight | Unsteady | Arm | Moving | StillWater
+@dataclass(frozen=True)
+class Overset:
+    """Oscillation on a towed path: a mesh of the body moves in a fixed one, in a stream of ``speed`` [m/s].
+
+    An option for comparison with sources that use it; ``Moving`` is the way of the tank.
+    """
+
+    speed: float
+
+    word = "overset"
+    application = "overPimpleDyMFoam"
+    templates = ("common", "unsteady", "moving", "overset")
+
+
+Formulation = Straight | Unsteady | Arm | Moving | StillWater | Overset
 
 
 @dataclass(frozen=True)
@@ -148,6 +162,27 @@ def formulation_of(test: CaptiveTest, domain: Domain, length: float, *, unsteady
         return Arm(float(nu[5]), (float(-nu[1] / nu[5]), float(nu[0] / nu[5])))
     inflow = domain.to_mesh(-nu[:3]) + 0.0
     return (Unsteady if unsteady else Straight)((float(inflow[0]), float(inflow[1]), float(inflow[2])))
+
+
+def overset_of(test: CaptiveTest, found: Formulation) -> Overset:
+    """The overset formulation of ``test``, for which the tank would choose ``found``.
+
+    Raises
+    ------
+    TankError
+        Nothing moves in the test, or there is no stream for it to move in.
+    """
+    if isinstance(found, Moving):
+        return Overset(found.speed)
+    why = (
+        "it oscillates faster than its tow, so its mesh would travel through water at rest and leave the background"
+        if isinstance(found, StillWater)
+        else f"it is a {test.motion.kind}, a steady run in which nothing moves against the water's mesh"
+    )
+    raise TankError(
+        f"test {test.name} has no overset formulation: {why}. Run it in a tank that chooses the formulation itself "
+        '(formulation = "own"); oscillations in a stream can be overset.'
+    )
 
 
 def domain_of(craft: Craft, test: CaptiveTest, half: bool | None = None) -> Domain:

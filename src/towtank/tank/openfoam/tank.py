@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -56,6 +56,8 @@ class OpenFoamTank:
     refinement : factor on the cells each way: meshes of one family.   cores : processes of one case.
     mesh, numerics : settings in place of the preset's.
     where : study folder; cases lie in ``runs/<id>/case``. Without it they are made in a temporary folder and removed.
+    formulation : "own" is chosen for each test; "overset" moves the body's mesh in a fixed one, for oscillations only,
+    to compare with sources that do so.
     from_neighbour : straight runs start from the nearest one that is solved on the same mesh, where there is one.
     stop : when it is set, the run under way ends; its files stay.
     surface : STL file in place of hull and fins, in metres, body axes, about the body origin.   snappy : its mesh.
@@ -68,6 +70,7 @@ class OpenFoamTank:
     mesh: MeshSettings | None = None
     numerics: Numerics | None = None
     where: Path | None = None
+    formulation: Literal["own", "overset"] = "own"
     from_neighbour: bool = True
     stop: threading.Event | None = field(default=None, compare=False, repr=False)
     surface: Path | str | None = None
@@ -90,6 +93,21 @@ class OpenFoamTank:
             )
         if self.surface is None and self.snappy is not None:
             raise InputError('OpenFoamTank: snappy is for a surface, and none is given. Add surface = "hull.stl".')
+
+        if self.formulation not in ("own", "overset"):
+            raise InputError(
+                f'OpenFoamTank: formulation {self.formulation!r} is not known. Give "overset", or leave it at "own", '
+                "which is chosen for each test."
+            )
+        if self.formulation == "overset" and self.surface is not None:
+            raise InputError(
+                "OpenFoamTank: an overset mesh is made of the craft's own hull, and a surface has none. Leave out one."
+            )
+        if self.formulation == "overset" and self.cores > 1:
+            raise InputError(
+                f"OpenFoamTank: overset on {self.cores} cores was never tried. Give cores = 1; several tests can run "
+                "side by side."
+            )
 
     @property
     def level(self) -> str:
@@ -116,7 +134,8 @@ class OpenFoamTank:
     @property
     def measured_as(self) -> str:
         """The preset whose measured errors hold; empty when something in it was changed."""
-        changed = self.turbulence or self.mesh or self.numerics or self.surface or self.refinement != 1.0
+        own = self.turbulence or self.mesh or self.numerics or self.surface
+        changed = own or self.refinement != 1.0 or self.formulation != "own"
         return "" if changed else self.quality
 
     def settings(self) -> dict[str, Any]:
@@ -129,6 +148,7 @@ class OpenFoamTank:
             "mesh": mesh.identity() if isinstance(mesh, SurfaceMesh) else asdict(mesh),
             "numerics": asdict(self.solution),
             "openfoam": f"{installation.version} {installation.kind}",
+            **({} if self.formulation == "own" else {"formulation": self.formulation}),
         }
 
     def below(self, study: Path) -> OpenFoamTank:
@@ -189,11 +209,12 @@ class OpenFoamTank:
                 return read_case(folder)
             except ArtefactError:
                 shutil.rmtree(folder)
-        start = self._neighbour(craft, test) if self.from_neighbour else None
+        overset = self.formulation == "overset"
+        start = self._neighbour(craft, test) if self.from_neighbour and not overset else None
         if start is not None:
             with suppress(TankError):  # solved on another mesh, or its fields are gone: the uniform flow serves
                 return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, start)
-        return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores)
+        return write_case(folder, craft, test, self.mesh_settings, self.solution, self.cores, overset=overset)
 
     def _neighbour(self, craft: Craft, test: CaptiveTest) -> Path | None:
         """The solved straight case of the same mesh whose inflow is nearest."""
