@@ -104,7 +104,8 @@ def test_folders_that_do_not_fit_are_refused(studied: tuple[Path, dict], tmp_pat
         ([a, b], "2 sets"),
         ([a, a, b], "two meshes"),
         ([a, b, str(tmp_path / "empty")], "holds no runs"),
-        ([a, b, c, "--resolutions", "1,2,3"], "for the fast tank"),
+        ([a, b, c, "--resolutions", "1,2,3"], "for runs to be made"),
+        ([a, b, c, "--tank", "openfoam"], "--tank is for runs to be made"),
     ):
         told = answer(*words, "--out", str(tmp_path / "study"), code=2)
         assert named in told["error"]

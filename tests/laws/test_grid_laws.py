@@ -312,6 +312,16 @@ def test_a_kind_that_was_not_studied_takes_the_largest_share_of_its_load():
     assert mesh_uncertainty(study, [run])[0, 1] == pytest.approx(largest * abs(run.loads[0, 1]))
 
 
+def test_a_load_that_was_studied_nowhere_takes_the_largest_share_of_any_load():
+    sets = made(2.0, (1.0, 1.4, 2.0))
+    study, run = grid_study(sets), sets[-1][0]
+    label = run.provenance["mesh"]["label"]
+    rolling = replace(run, kind="roll", loads=run.loads + np.array([0.0, 0.0, 0.0, 7.0, 0.0, 0.0]))
+    largest = max(study.share(item.kind, item.load, label) for item in study.quantities)
+    assert largest > 0.0
+    assert mesh_uncertainty(study, [rolling])[0, 3] == pytest.approx(7.0 * largest)
+
+
 def test_a_run_that_does_not_name_its_mesh_is_on_the_chosen_one():
     sets = made(2.0, (1.0, 1.4, 2.0), 0.04)
     study = grid_study(sets, target=0.1)

@@ -18,8 +18,8 @@ def mesh_uncertainty(study: GridStudy, runs: Sequence[Run]) -> Array:
 
     ``GridStudy.share`` of the kind, load and mesh of the run, times the root mean square of the load over what is
     analysed. A run that does not name its mesh is taken to be on the chosen one. A load that the study does not hold in
-    runs of that kind takes its largest share in the other kinds, and zero when the study does not hold it at all:
-    such a load was below 1 % in every run of the study.
+    runs of that kind takes its largest share in the other kinds. One that it does not hold at all, such as the roll
+    moment in a study without roll runs, takes the largest share of any load.
 
     Raises
     ------
@@ -40,8 +40,10 @@ def _share(study: GridStudy, kind: str, load: str, label: str) -> float:
     found = study.share(kind, load, label)
     if found is not None:
         return found
-    others = (study.share(other, load, label) for other in dict.fromkeys(item.kind for item in study.quantities))
-    return max((share for share in others if share is not None), default=0.0)
+    kinds = dict.fromkeys(item.kind for item in study.quantities)
+    held = [share for other in kinds if (share := study.share(other, load, label)) is not None]
+    known = (study.share(item.kind, item.load, label) for item in study.quantities)
+    return max(held or [share for share in known if share is not None])
 
 
 def _label(study: GridStudy, run: Run) -> str:

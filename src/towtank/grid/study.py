@@ -154,11 +154,23 @@ def grid_study(sets: Sequence[Sequence[Run]], *, target: float = TARGET) -> Grid
     first = rows[0][0]
     levels = sorted({run.level for row in rows for run in row})
     known = provenance(
-        {f"{mesh.label}/{run.name}": run.id for row in rows for mesh, run in zip(meshes, row, strict=True)}
+        {f"{mesh.label}/{run.name}": run.id for row in rows for mesh, run in zip(meshes, row, strict=True)},
+        **_distributions(meshes, rows),
     )
     return GridStudy(
         first.craft, " + ".join(levels), first.symmetry, meshes, quantities, target, chosen, met, words, known
     )
+
+
+def _distributions(meshes: Sequence[Mesh], rows: Sequence[Sequence[Run]]) -> dict[str, Any]:
+    """What the runs carry of y+ and Courant number, by mesh and run; nothing where none carries it."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        for mesh, run in zip(meshes, row, strict=True):
+            health = run.provenance.get("health", {})
+            if isinstance(health, Mapping) and health.get("distribution"):
+                found.setdefault(mesh.label, {})[run.name] = health["distribution"]
+    return {"distribution": found} if found else {}
 
 
 def check_target(target: float) -> None:

@@ -7,6 +7,7 @@ from functools import partial
 from towtank.figures import grid as figures
 from towtank.grid.study import GridStudy, Quantity
 from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated
+from towtank.report.of_rans import resolution_of_meshes
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import STAGES, Study
 
@@ -27,7 +28,7 @@ def mesh(study: Study, book: Sketchbook) -> Section:
         blocks.append(book.panels(calls, words, (2.3,), max(len(calls), 2)))
     words = "95 % bound of every quantity on the chosen mesh."
     blocks.append(book.draw(figures.bounds, it, caption=words))
-    return Section("grid", TITLE, (*blocks, _table(it)))
+    return Section("grid", TITLE, (*blocks, *resolution_of_meshes(it, book), _table(it)))
 
 
 def _meshes(it: GridStudy) -> Table:

@@ -13,6 +13,7 @@ from towtank.frames import drift_angle, incidence_angle
 from towtank.plan.kinds import Plan
 from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated
 from towtank.report.of_plan import chosen
+from towtank.report.of_rans import resolution
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import STAGES, Study
 from towtank.tank.run import Run
@@ -23,6 +24,7 @@ def matrix(study: Study, book: Sketchbook) -> Section:
     blocks: list[Block] = []
     if study.runs:
         blocks.append(_by_kind(study.runs, _level(study.runs)))
+        blocks += resolution(study.runs, book)
     elif study.plan is not None:
         blocks += [missing("No run has been made yet.", STAGES["runs"]), _planned(study.plan)]
     else:

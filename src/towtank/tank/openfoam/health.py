@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from towtank.frames import Array
 from towtank.tank.openfoam.case import Case
+from towtank.tank.openfoam.measure import kept
 from towtank.tank.openfoam.monitor import load_scale
 from towtank.tank.openfoam.runner import Outcome
 
@@ -51,6 +52,8 @@ class Health:
     scatter (6,) : standard deviation of a steady load over its window, as a share of its largest.
     y_plus : patch -> least, largest, mean.   periods : largest difference of the last two periods; 0 when steady.
     residual : largest share outside the first three harmonics; 0 when steady.
+    distribution : shares of y+ and Courant number in bins, as in ``Distribution.document``; empty for a case that was
+    solved before they were kept. No limit is set on them: see ``docs/openfoam.md``.
     """
 
     ended: str
@@ -65,6 +68,7 @@ class Health:
     periods: float
     residual: float
     start: str
+    distribution: Mapping[str, Any] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """For the provenance of the run."""
@@ -88,6 +92,7 @@ def health_of(case: Case, outcome: Outcome, loads: Array) -> Health:
         periods=0.0 if case.held else period_difference(loads, case.test.samples, case.length),
         residual=0.0 if case.held else harmonic_residual(loads, case.test.samples, case.length),
         start=case.start,
+        distribution=kept(case.folder),
     )
 
 

@@ -27,6 +27,7 @@ from towtank.tank.openfoam.case import MARGIN_OF_TIME, Case, write_document, wri
 from towtank.tank.openfoam.dictionary import set_entry, times
 from towtank.tank.openfoam.find import Installation
 from towtank.tank.openfoam.formulation import Arm, load_limit
+from towtank.tank.openfoam.measure import keep
 from towtank.tank.openfoam.monitor import Log, changes, flat
 
 SCHEMA = "towtank/case-outcome/1"
@@ -349,6 +350,7 @@ def _finish(case: Case, installation: Installation) -> None:
             shutil.rmtree(part)
     for folder in times(case.folder)[:-1]:
         shutil.rmtree(folder)
+    keep(case)
     for name in ("phi", "yPlus", "meshPhi"):
         for extra in case.folder.glob(f"[0-9]*/{name}"):
             extra.unlink()
