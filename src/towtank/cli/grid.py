@@ -129,7 +129,6 @@ def _of_rans(chain: Chain, share: float, wanted: tuple[float, ...] | None) -> Gr
     """The study in OpenFOAM; what each mesh costs is told before the first solver starts."""
     from towtank.grid.rans import RESOLUTIONS, family, rans_on_meshes, rans_plan, unlike
     from towtank.grid.study import grid_study
-    from towtank.tank.openfoam.case import label_of
     from towtank.tank.openfoam.schedule import cells_of
 
     reply, base, plan = chain.reply, towing.openfoam(chain), rans_plan(chain.craft)
@@ -140,13 +139,13 @@ def _of_rans(chain: Chain, share: float, wanted: tuple[float, ...] | None) -> Gr
         cells = cells_of(chain.craft, plan.tests[0], tank.mesh_settings)
         cost = sum(tank.schedule(chain.craft, plan.tests).costs)
         told = f"about {cells} cells, {len(plan.tests)} runs, {cost:.0f} s of CPU from their start"
-        reply.log(f"grid     {label_of(tank.mesh_settings)}: {told}")
+        reply.log(f"grid     {tank.mesh_settings.label}: {told}")
     runs = rans_on_meshes(plan, tanks, chain.study.root, Remarks(reply), towing.jobs(chain))
     for name, steps in unlike(runs).items():
         told = ", ".join(map(str, steps))
         reply.log(f"  warning: {name} took {told} steps a period, coarse to fine; its changes are of the step too")
     study = grid_study(runs, target=share)
-    chosen = next(tank for tank in tanks if label_of(tank.mesh_settings) == study.chosen)
+    chosen = next(tank for tank in tanks if tank.mesh_settings.label == study.chosen)
     reply.summary["refinement"] = chosen.refinement
     return study
 

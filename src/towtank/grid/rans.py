@@ -18,8 +18,7 @@ from towtank.plan.standard import standard_plan
 from towtank.progress import Progress
 from towtank.quantity import Quantity
 from towtank.tank.campaign import tow
-from towtank.tank.openfoam.case import label_of
-from towtank.tank.openfoam.mesh.grid import mesh_of
+from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
 from towtank.tank.openfoam.schedule import cells_of
 from towtank.tank.openfoam.tank import OpenFoamTank
 from towtank.tank.run import Run
@@ -57,7 +56,10 @@ def family(craft: Craft, plan: Plan, resolutions: Sequence[float], base: OpenFoa
         the fins.
     """
     tanks = [replace(base, refinement=_snapped(resolution)) for resolution in sorted(resolutions)]
-    labels = [label_of(tank.mesh_settings) for tank in tanks]
+    meshes = [tank.mesh_settings for tank in tanks if isinstance(tank.mesh_settings, MeshSettings)]
+    if len(meshes) < len(tanks):
+        raise InputError("grid: an imported surface has no family of meshes. Leave out `surface`.")
+    labels = [mesh.label for mesh in meshes]
     if len(set(labels)) < max(len(labels), LEAST_MESHES):
         raise InputError(
             f"grid: resolutions {', '.join(f'{r:g}' for r in resolutions)} make the meshes {', '.join(labels)}. "
@@ -68,7 +70,7 @@ def family(craft: Craft, plan: Plan, resolutions: Sequence[float], base: OpenFoa
     check_sizes(cells ** (-1.0 / 3.0))
     if craft.fins:
         # The coarsest has the fewest cells on a fin.
-        _ = mesh_of(craft, tanks[0].mesh_settings, half=False, fins=(0.0,) * len(craft.fins), speed=plan.speed)
+        _ = mesh_of(craft, meshes[0], half=False, fins=(0.0,) * len(craft.fins), speed=plan.speed)
     return tanks
 
 
@@ -90,7 +92,7 @@ def rans_on_meshes(
     TankError
         Runs failed, or the study was stopped; what is on file stays for the next call.
     """
-    folders = [Path(out) / "grid" / label_of(tank.mesh_settings) for tank in tanks]
+    folders = [Path(out) / "grid" / tank.mesh_settings.label for tank in tanks]
     return tuple(tow(plan, tank, folder, progress, jobs=jobs) for tank, folder in zip(tanks, folders, strict=True))
 
 

@@ -51,7 +51,7 @@ def write_case_mesh(
         cells, name = settings.write(folder, craft, test, speed)
         return Written((WALL,), cells, settings.label, name)
     seen, angles = domain.craft_in_mesh(craft), test.fins or (0.0,) * len(craft.fins)
-    label = label_of(settings)
+    label = settings.label
     if isinstance(formulation, Overset):
         assert line is not None  # only oscillations are overset
         poses = pose(test, domain, formulation, line)[1:]
@@ -63,15 +63,6 @@ def write_case_mesh(
     write_mesh(mesh, folder)
     walls = tuple(patch.name for patch in mesh.patches if patch.kind == "wall")
     return Written(walls, mesh.cells, label, _hash(mesh))
-
-
-def label_of(settings: MeshSettings) -> str:
-    """Name of a mesh of a family: its counts, y+ and refinement."""
-    return (
-        f"{settings.along}x{settings.out}x{settings.around}-y{settings.y_plus:g}"
-        + (f"-c{settings.chord}" if settings.chord else "")
-        + (f"-r{settings.refinement:.4g}" if settings.refinement != 1.0 else "")
-    )
 
 
 def _hash(mesh: PolyMesh) -> str:

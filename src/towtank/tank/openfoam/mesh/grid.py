@@ -54,6 +54,15 @@ class MeshSettings:
     chord: int = 0
     half: bool | None = None
 
+    @property
+    def label(self) -> str:
+        """Name of the mesh in its family: counts, y+, cells on the chord and refinement."""
+        return (
+            f"{self.along}x{self.out}x{self.around}-y{self.y_plus:g}"
+            + (f"-c{self.chord}" if self.chord else "")
+            + (f"-r{self.refinement:.4g}" if self.refinement != 1.0 else "")
+        )
+
     def counts(self) -> tuple[int, int, int]:
         """Cells (along, around, out) after refinement; ``around`` is the nearest multiple of 4, which the caps need.
 
