@@ -35,7 +35,7 @@ def plan() -> Plan:
 
 def study() -> GridStudy:
     """The same tests on each mesh of the draft's family."""
-    return grid_study([tow(plan(), OpenFoamTank("draft", refinement=factor), WORK) for factor in REFINEMENTS])
+    return grid_study([tow(plan(), OpenFoamTank("draft", refinement=factor), WORK / "grid") for factor in REFINEMENTS])
 
 
 def rows(found: GridStudy) -> Iterator[tuple[str, ...]]:

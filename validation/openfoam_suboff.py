@@ -135,7 +135,7 @@ def rows(name: str, variant: Variant) -> Iterator[tuple[str, ...]]:
     plan = plan_of(variant)
     for test in plan.tests:
         try:
-            (run,) = tow(replace(plan, tests=(test,)), variant.tank, WORK)
+            (run,) = tow(replace(plan, tests=(test,)), variant.tank, WORK / "drift")
         except TankError as error:
             yield (name, variant.change, "", test.name, "", "", "", "", "", str(error).split("\n")[0])
             continue

@@ -36,7 +36,8 @@ class Numerics:
     ramp : periods before the recorded ones in which the motion swells smoothly from rest. Multiples of a half begin
     and end where the displacement passes zero, and are smooth by one derivative more.
     scheme : of time. Euler lags the load by up to a step: at 100 steps a period it moved Y'v by 42 %.
-    outer, inner : PIMPLE loops, and pressure corrections in each.
+    outer, inner : PIMPLE loops, and pressure corrections in each.   non_orthogonal : further solutions of each pressure
+    equation. SUBOFF with fins on 32 and 40 cells around diverged without one, behind the tail.
     iterations : most iterations of a steady case.   flat : it stops when the mean load changes by less than this share
     of the largest force and moment between the halves of the last ``window`` iterations.
     relax_u, relax_turbulence : equation under-relaxation of SIMPLEC.
@@ -54,6 +55,7 @@ class Numerics:
     scheme: Literal["backward", "Euler"] = "backward"
     outer: int = 2
     inner: int = 2
+    non_orthogonal: int = 0
     iterations: int = 600
     flat: float = 0.002
     window: int = 50

@@ -39,10 +39,10 @@ PHYSICS = 1
 
 PRESETS: dict[str, tuple[MeshSettings, Numerics]] = {
     "draft": (MeshSettings(along=60, around=16, out=32, y_plus=60.0, far=2.5), Numerics()),
-    "standard": (MeshSettings(along=80, around=24, out=40, y_plus=60.0, far=2.5), Numerics(turbulence="kOmegaSST")),
+    "standard": (MeshSettings(along=80, around=24, out=40, y_plus=60.0, far=2.5), Numerics()),
     "fine": (
-        MeshSettings(along=120, around=36, out=60, y_plus=45.0, far=4.0),
-        Numerics(turbulence="kOmegaSST", steps=200, iterations=1500),
+        MeshSettings(along=120, around=36, out=60, y_plus=60.0, far=2.5),
+        Numerics(steps=200, iterations=1500, non_orthogonal=1),
     ),
 }
 """Quality -> mesh and numerics. y+ of draft and standard: the first cell of the runs that were measured."""
