@@ -78,7 +78,8 @@ def tests(setup: str, craft: str) -> list[CaptiveTest]:
         sway, yaw = SWING * U / PMM, SWING * U / L * U / PMM**2
         out += [CaptiveTest("sway", U, Sway(U, sway, PMM), periods=2, samples=60),
                 CaptiveTest("yaw", U, Yaw(U, yaw, PMM), periods=2, samples=60),
-                CaptiveTest("sway-rest", CREEP, Sway(CREEP, sway, PMM), periods=2, samples=120, exploratory=True)]  # fmt: skip
+                CaptiveTest("sway-rest", CREEP, Sway(CREEP, sway, PMM), periods=2, samples=120,
+                            exploratory=True)]  # fmt: skip
     if setup in ("draft", "realizable") and craft == "bare":
         out += [CaptiveTest(f"straight-{speed:.2f}", speed, Drift(speed, 0.0))
                 for speed, _ in DATA["resistance_bare_N"]]  # fmt: skip

@@ -57,7 +57,7 @@ WALL = {"y_plus": 1.0, "out": 48}
 VARIANTS: dict[str, Variant] = {
     "draft": Variant(OpenFoamTank("draft"), "none", ALL, arm=True),
     "standard": Variant(OpenFoamTank("standard"), "preset standard", ALL, arm=True),
-    "fine": Variant(OpenFoamTank("fine"), "preset fine", ALL, arm=True),
+    "fine": Variant(OpenFoamTank("fine"), "preset fine", arm=True),
     "sst": Variant(_draft(turbulence="kOmegaSST"), "k-omega SST, wall functions", ALL, arm=True),
     "realizable": Variant(_draft(turbulence="realizableKE"), "realizable k-epsilon, wall functions", ALL, arm=True),
     "rng": Variant(_draft(turbulence="RNGkEpsilon"), "RNG k-epsilon, wall functions", arm=True),
