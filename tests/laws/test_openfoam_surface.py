@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import towtank as tt
-from openfoam_cases import TINY
+from openfoam_cases import TINY, stand_in
 from towtank.craft.hull import Ellipsoid
 from towtank.craft.solid import write_stl
 from towtank.errors import InputError, TankError
@@ -18,6 +19,7 @@ from towtank.plan.motion import Drift
 from towtank.progress import Silent
 from towtank.tank.identity import run_id
 from towtank.tank.openfoam.fields import read_mesh
+from towtank.tank.openfoam.mesh import imported, snappy_run
 from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
 from towtank.tank.openfoam.mesh.imported import COVERED, measures_of, mesh_remarks
 from towtank.tank.openfoam.mesh.layers import Columns, columns, layers_of
@@ -335,6 +337,27 @@ def test_poor_layers_are_a_remark_with_the_limit_and_what_may_be_done(tmp_path):
     assert "says 6.5 layers, 3.85 are there" in mesh_remarks({**good, "told": {"layers": 6.5}})[0]
     assert "area" in mesh_remarks({**good, "area": 0.9})[0]
     assert mesh_remarks(measures_of(tmp_path)) == ()
+
+
+def test_a_mesh_is_made_once_and_again_when_a_template_of_it_is_edited(stl, tmp_path, monkeypatch):
+    made = []
+
+    def make(folder, *_):
+        made.append(folder)
+        write_mesh(stacked([0.5], 1.0), folder)
+
+    monkeypatch.setattr(imported, "make", make)
+    monkeypatch.setattr(imported, "measured", lambda *_: {"schema": imported.SCHEMA, "cells": 32})
+    monkeypatch.setattr(imported, "require", lambda: stand_in(tmp_path))
+    monkeypatch.setattr(snappy_run, "TEMPLATES", shutil.copytree(snappy_run.TEMPLATES, tmp_path / "templates"))
+    mesh = OpenFoamTank(surface=stl, where=tmp_path).mesh_settings
+    for case in ("first", "second"):
+        mesh.write(tmp_path / case, CRAFT, AHEAD, AHEAD.speed)
+    assert len(made) == 1
+    edited = tmp_path / "templates" / "system" / "snappyHexMeshDict"
+    edited.write_text(edited.read_text().replace("nSmoothPatch    3", "nSmoothPatch    4"))
+    mesh.write(tmp_path / "third", CRAFT, AHEAD, AHEAD.speed)
+    assert len(set(made)) == 2
 
 
 def test_a_coarse_surface_is_meshed_and_its_layers_are_there(tmp_path, monkeypatch):

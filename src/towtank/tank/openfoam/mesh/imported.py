@@ -28,7 +28,7 @@ from towtank.tank.openfoam.mesh.layers import columns, layers_of
 from towtank.tank.openfoam.mesh.poly import Patch, PolyMesh
 from towtank.tank.openfoam.mesh.quality import quality
 from towtank.tank.openfoam.mesh.snappy import SnappySettings, dictionaries, told
-from towtank.tank.openfoam.mesh.snappy_run import make, meshing_time
+from towtank.tank.openfoam.mesh.snappy_run import make, meshing_time, templates
 from towtank.tank.openfoam.mesh.spacing import first_cell
 from towtank.tank.openfoam.mesh.stl import Surface, check_fit, read_surface
 
@@ -124,7 +124,7 @@ class SurfaceMesh:
         installation = require()
         heights = self.settings.heights(craft, speed, surface.edges > 0)
         values = dictionaries(surface, craft, self.settings, heights)
-        key = digest([surface.digest, values, f"{installation.version} {installation.kind}"])
+        key = digest([surface.digest, templates(), values, f"{installation.version} {installation.kind}"])
         place = store / f"{self.label}-{key}"
         store.mkdir(parents=True, exist_ok=True)
         with _alone(store / f".{place.name}.lock"):
