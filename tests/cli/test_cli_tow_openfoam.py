@@ -190,8 +190,8 @@ def test_an_ended_campaign_leaves_no_solver_and_goes_on_from_its_files(tmp_path:
     frozen = _signalled(_solvers(study), signal.SIGSTOP)
     second, states = _invoke("tow", "--out", str(study)), _states(study)
     process.send_signal(how)
-    _signalled(frozen, signal.SIGCONT)
     _, told = process.communicate(timeout=PATIENCE)
+    _signalled(frozen, signal.SIGCONT)  # not before: a solver that goes on may be at its end before it is told
     _until(lambda: not _solvers(study))
     assert second.exit_code == 3
     assert f"process {process.pid}" in second.stderr

@@ -6,13 +6,16 @@ import json
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import cluster_cases as cases
 import pytest
 
+import towtank.cluster.dask
 from towtank.cluster.ledger import Failed, open_ledger
 from towtank.cluster.work import Stopped, Task, each_once
 from towtank.errors import ArtefactError, InputError, TowtankError
@@ -20,6 +23,8 @@ from towtank.progress import Silent
 
 ITEMS = list(range(12))
 KEYS = [f"item-{item}" for item in ITEMS]
+PATIENCE = 60.0
+"""Seconds that a loaded machine may take for what needs one."""
 
 
 def run(folder: Path, work: Any = cases.square, items: list[int] = ITEMS, **options: Any) -> dict[int, Any]:
@@ -71,24 +76,24 @@ def recorded(folder: Path) -> set[int]:
     return {int(path.stem.removeprefix("item-")) for path in (folder / "ledger").glob("item-*.json")}
 
 
-def _kill_the_held_one(folder: Path, **how: Any) -> dict[int, Any]:
-    """Kill -9 the process of the item that does not end by itself."""
-    found: dict[int, Any] = {}
-    killed = False
-    answers = each_once(cases.held, folder / "log", ITEMS, keys=KEYS, ledger=folder / "ledger", **how)
-    for index, result in answers:
-        found[index] = result
-        started = {item: pid for _, item, pid in cases.lines(folder / "log")}
-        if not killed and cases.HELD in started:
-            os.kill(started[cases.HELD], signal.SIGKILL)
-            killed = True
-    assert killed, "the item was never seen under way"
-    return found
+def _killed_under_way(folder: Path) -> int:
+    """Kill -9 the process of the item that does not end by itself, once it is under way."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        for _, item, process in cases.lines(folder / "log"):
+            if item == cases.HELD:
+                os.kill(process, signal.SIGKILL)
+                return process
+        time.sleep(0.02)
+    raise AssertionError("the item was never seen under way")
 
 
 @pytest.mark.parametrize("how", ["crew", "dask"], indirect=True)
 def test_when_a_worker_is_killed_its_item_is_started_again_and_no_finished_one(how: dict[str, Any], tmp_path: Path):
-    found = _kill_the_held_one(tmp_path, **how)
+    with ThreadPoolExecutor(1) as aside:
+        victim = aside.submit(_killed_under_way, tmp_path)
+        found = run(tmp_path, work=cases.held, **how)
+        assert victim.result() > 0
     assert {i: r["square"] for i, r in found.items()} == {i: i * i for i in ITEMS}
     started, ended = cases.counted(tmp_path / "log")
     assert ended == dict.fromkeys(ITEMS, 1)
@@ -193,7 +198,15 @@ def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path, monkeypatch: p
 def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     import distributed
 
-    monkeypatch.setattr("towtank.cluster.dask.PATIENCE", "1s")
+    connect = towtank.cluster.dask._client
+
+    def connected(*where: Any) -> Any:
+        """All patience for the scheduler, little for workers that never come."""
+        client = connect(*where)
+        monkeypatch.setattr("towtank.cluster.dask.PATIENCE", "1s")
+        return client
+
+    monkeypatch.setattr("towtank.cluster.dask._client", connected)
     empty = distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50)
     with empty, pytest.raises(InputError, match="has no workers"):
         run(tmp_path, where=empty.scheduler_address)

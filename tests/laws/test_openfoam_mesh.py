@@ -25,20 +25,20 @@ X = read_craft("suboff-x")
 def patch_area(mesh: PolyMesh, name: str) -> float:
     patch = mesh.patch(name)
     _, area = face_vectors(mesh)
-    return float(np.linalg.norm(area[patch.start : patch.start + patch.count], axis=1).sum())
+    return float(np.linalg.norm(area[patch.faces], axis=1).sum())
 
 
 def enclosed(mesh: PolyMesh, name: str) -> float:
     """Volume inside a closed patch that looks away from the cells, or inside a half one cut at z = 0."""
     patch = mesh.patch(name)
     centre, area = face_vectors(mesh)
-    here = slice(patch.start, patch.start + patch.count)
+    here = patch.faces
     return float(np.einsum("fi,fi->", centre[here], area[here]) / 3.0)
 
 
 def wall_points(mesh: PolyMesh, name: str) -> np.ndarray:
     patch = mesh.patch(name)
-    return mesh.points[np.unique(mesh.faces[patch.start : patch.start + patch.count])]
+    return mesh.points[np.unique(mesh.faces[patch.faces])]
 
 
 @pytest.fixture(scope="module")
@@ -222,7 +222,7 @@ def test_the_first_cell_has_the_height_of_the_target():
     patch = mesh.patch("hull")
     centre, area = face_vectors(mesh)
     middle, _ = cell_volumes(mesh, centre, area)
-    here = slice(patch.start, patch.start + patch.count)
+    here = patch.faces
     normal = area[here] / np.linalg.norm(area[here], axis=1)[:, None]
     distance = np.einsum("fi,fi->f", normal, centre[here] - middle[mesh.owner[here]])
     # Lines leave at right angles but at the sharp tail; facets of a coarse mesh lie up to a tenth of a cell off.
@@ -242,7 +242,7 @@ def test_cells_at_the_poles_are_as_large_as_their_neighbours():
     mesh = mesh_of(replace(BARE, profile=Ellipsoid(6.0, 1.0)), MeshSettings(60, 24, 16), half=False)
     patch = mesh.patch("hull")
     centre, area = face_vectors(mesh)
-    here = slice(patch.start, patch.start + patch.count)
+    here = patch.faces
     size = np.sqrt(np.linalg.norm(area[here], axis=1))
     nose = centre[here, 0] > centre[here, 0].max() - 0.02 * 6.0
     # A fan of 48 wedges has cells of r d theta / 2 = 7 % of their length; the corners of the core are at half.

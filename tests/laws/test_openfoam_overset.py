@@ -57,7 +57,7 @@ def test_a_cell_at_either_rim_lies_well_inside_the_other_mesh_through_the_whole_
     shape = outline(CRAFT.profile, MESH.far * L)
     centres, _ = cell_volumes(pair.mesh, *face_vectors(pair.mesh))
     rim = pair.mesh.patch(PATCH)
-    at_rim = np.unique(pair.mesh.owner[rim.start : rim.start + rim.count])
+    at_rim = np.unique(pair.mesh.owner[rim.faces])
     body, fixed = at_rim[at_rim < pair.moving], at_rim[at_rim >= pair.moving]
     for y in (-amplitude, 0.0, amplitude):
         aside = np.array([0.0, y, 0.0])

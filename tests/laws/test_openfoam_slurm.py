@@ -299,4 +299,4 @@ def _until(condition: Callable[[], object], process: subprocess.Popen[str]) -> N
     end = time.monotonic() + PATIENCE
     while not condition() and process.poll() is None and time.monotonic() < end:
         time.sleep(0.1)
-    assert condition(), process.communicate(timeout=1.0)[1] if process.poll() is not None else "too slow"
+    assert condition(), process.communicate(timeout=PATIENCE)[1] if process.poll() is not None else "too slow"

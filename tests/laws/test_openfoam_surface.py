@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,15 +10,16 @@ import numpy as np
 import pytest
 
 import towtank as tt
-from openfoam_cases import TINY
+from openfoam_cases import TINY, stand_in
 from towtank.craft.hull import Ellipsoid
 from towtank.craft.solid import write_stl
-from towtank.errors import ArtefactError, InputError
+from towtank.errors import InputError, TankError
 from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import Drift
 from towtank.progress import Silent
 from towtank.tank.identity import run_id
-from towtank.tank.openfoam.mesh.foam import read_mesh
+from towtank.tank.openfoam.fields import read_mesh
+from towtank.tank.openfoam.mesh import imported, snappy_run
 from towtank.tank.openfoam.mesh.grid import MeshSettings, mesh_of
 from towtank.tank.openfoam.mesh.imported import COVERED, measures_of, mesh_remarks
 from towtank.tank.openfoam.mesh.layers import Columns, columns, layers_of
@@ -239,8 +241,9 @@ def test_layers_of_the_structured_mesh_are_those_it_was_made_with():
     assert set(found.count) == {2}
 
 
-def test_a_mesh_on_file_is_read_as_it_was_written(tmp_path):
-    mesh = mesh_of(CRAFT, TINY, half=True)
+@pytest.mark.parametrize("half", [True, False])
+def test_a_mesh_on_file_is_read_as_it_was_written(tmp_path, half):
+    mesh = mesh_of(CRAFT, TINY, half=half)
     write_mesh(mesh, tmp_path)
     back = read_mesh(tmp_path)
     assert back.patches == mesh.patches
@@ -249,7 +252,65 @@ def test_a_mesh_on_file_is_read_as_it_was_written(tmp_path):
         assert np.array_equal(getattr(back, name), getattr(mesh, name)), name
     short = tmp_path / "constant" / "polyMesh" / "points"
     short.write_bytes(short.read_bytes()[:-2000])
-    with pytest.raises(ArtefactError, match="shorter than it says"):
+    with pytest.raises(TankError, match="cut off"):
+        read_mesh(tmp_path)
+
+
+def widened(mesh):
+    """The mesh with one more corner on an edge of each face."""
+    cut = 0.5 * (mesh.points[mesh.faces[:, 0]] + mesh.points[mesh.faces[:, 1]])
+    faces = np.column_stack([mesh.faces[:, 0], len(mesh.points) + np.arange(len(cut)), mesh.faces[:, 1:]])
+    return replace(mesh, points=np.concatenate([mesh.points, cut]), faces=faces)
+
+
+def test_a_mesh_in_ascii_with_faces_of_any_number_of_corners_is_read(tmp_path):
+    mesh = stacked([0.5], 1.0)
+    wide = widened(mesh)
+    wide.faces[::2] = np.column_stack([mesh.faces[::2], np.full(len(mesh.faces[::2]), -1)])
+    write_mesh(mesh, tmp_path)  # for its boundary, which is in ascii
+    lists = {
+        "points": [f"({x!r} {y!r} {z!r})" for x, y, z in wide.points.tolist()],
+        "faces": [f"{sum(row >= 0)}({' '.join(map(str, row[row >= 0]))})" for row in wide.faces],
+        "owner": map(str, wide.owner),
+        "neighbour": map(str, wide.neighbour),
+    }
+    for name, rows in lists.items():
+        head = f"FoamFile {{ format ascii; object {name}; }}\n{len(getattr(wide, name))}\n(\n"
+        (tmp_path / "constant" / "polyMesh" / name).write_text(head + "\n".join(rows) + "\n)\n")
+    back = read_mesh(tmp_path)
+    assert (back.patches, back.cells) == (wide.patches, wide.cells)
+    for name in ("points", "faces", "owner", "neighbour"):
+        assert np.array_equal(getattr(back, name), getattr(wide, name)), name
+
+
+def test_the_last_cell_counts_where_it_owns_no_face(tmp_path):
+    """As renumbering leaves it: all faces of a cell within the others belong to cells of lower number."""
+    mesh = stacked([1.0, 1.0], 1.0)
+    within = np.setdiff1d(np.arange(mesh.cells), mesh.owner[len(mesh.neighbour) :])[0]
+    number = np.argsort(np.argsort(np.where(np.arange(mesh.cells) == within, mesh.cells, np.arange(mesh.cells))))
+    owner, neighbour = number[mesh.owner], number[mesh.neighbour]
+    faces, turned = mesh.faces.copy(), np.flatnonzero(owner[: len(neighbour)] > neighbour)
+    owner[turned], neighbour[turned], faces[turned] = neighbour[turned], owner[turned], faces[turned, ::-1]
+    assert owner.max() < mesh.cells - 1
+    write_mesh(replace(mesh, owner=owner, neighbour=neighbour, faces=faces), tmp_path)
+    back = read_mesh(tmp_path)
+    assert cell_volumes(back, *face_vectors(back))[1] == pytest.approx(np.ones(mesh.cells))
+
+
+@pytest.mark.parametrize(("file", "old", "new", "told"), [
+    ("boundary", b"type wall", b"kind wall", "patch hull lacks its type"),
+    ("boundary", b"nFaces 16", b"nFaces 15", "do not fit each other"),
+    ("boundary", b"startFace", b"startface", "patch hull lacks"),
+    ("faces", b"faceCompactList", b"faceList", "class faceList"),
+    ("owner", b"format binary", b"format ascii", "holds"),
+])  # fmt: skip
+def test_a_mesh_that_is_not_whole_is_refused_with_the_file(tmp_path, file, old, new, told):
+    write_mesh(stacked([0.5], 1.0), tmp_path)
+    path = tmp_path / "constant" / "polyMesh" / file
+    content = path.read_bytes()
+    assert old in content
+    path.write_bytes(content.replace(old, new))
+    with pytest.raises(TankError, match=told):
         read_mesh(tmp_path)
 
 
@@ -257,9 +318,7 @@ def test_faces_of_more_corners_are_measured_like_the_same_ones_of_four():
     """Corners put on the edges of faces change neither volume nor centre."""
     mesh = stacked([0.5], 1.0)
     centres, area = face_vectors(mesh)
-    cut = 0.5 * (mesh.points[mesh.faces[:, 0]] + mesh.points[mesh.faces[:, 1]])
-    faces = np.column_stack([mesh.faces[:, 0], len(mesh.points) + np.arange(len(cut)), mesh.faces[:, 1:]])
-    wide = replace(mesh, points=np.concatenate([mesh.points, cut]), faces=faces)
+    wide = widened(mesh)
     for ours, theirs in zip(face_vectors(wide), (centres, area), strict=True):
         assert ours == pytest.approx(theirs, abs=1e-12)
     assert cell_volumes(wide, *face_vectors(wide))[1].sum() == pytest.approx(24.0)
@@ -278,6 +337,27 @@ def test_poor_layers_are_a_remark_with_the_limit_and_what_may_be_done(tmp_path):
     assert "says 6.5 layers, 3.85 are there" in mesh_remarks({**good, "told": {"layers": 6.5}})[0]
     assert "area" in mesh_remarks({**good, "area": 0.9})[0]
     assert mesh_remarks(measures_of(tmp_path)) == ()
+
+
+def test_a_mesh_is_made_once_and_again_when_a_template_of_it_is_edited(stl, tmp_path, monkeypatch):
+    made = []
+
+    def make(folder, *_):
+        made.append(folder)
+        write_mesh(stacked([0.5], 1.0), folder)
+
+    monkeypatch.setattr(imported, "make", make)
+    monkeypatch.setattr(imported, "measured", lambda *_: {"schema": imported.SCHEMA, "cells": 32})
+    monkeypatch.setattr(imported, "require", lambda: stand_in(tmp_path))
+    monkeypatch.setattr(snappy_run, "TEMPLATES", shutil.copytree(snappy_run.TEMPLATES, tmp_path / "templates"))
+    mesh = OpenFoamTank(surface=stl, where=tmp_path).mesh_settings
+    for case in ("first", "second"):
+        mesh.write(tmp_path / case, CRAFT, AHEAD, AHEAD.speed)
+    assert len(made) == 1
+    edited = tmp_path / "templates" / "system" / "snappyHexMeshDict"
+    edited.write_text(edited.read_text().replace("nSmoothPatch    3", "nSmoothPatch    4"))
+    mesh.write(tmp_path / "third", CRAFT, AHEAD, AHEAD.speed)
+    assert len(set(made)) == 2
 
 
 def test_a_coarse_surface_is_meshed_and_its_layers_are_there(tmp_path, monkeypatch):

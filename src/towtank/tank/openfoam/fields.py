@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from towtank.errors import TankError
 from towtank.frames import Array
-
-Whole = NDArray[np.int64]
+from towtank.tank.openfoam.mesh.poly import Labels, Patch, PolyMesh
 
 _REMARK = re.compile(rb"(?:\s|//[^\n]*\n|/\*.*?\*/)*", re.DOTALL)
 _COUNT = re.compile(rb"\s*(\d+)\s*([({])")
@@ -23,40 +22,6 @@ _UNIFORM = re.compile(rb"\s*uniform\s+([^;\s]+)\s*;")
 _LISTED = re.compile(rb"\s*nonuniform\s+List<(\w+)>")
 _EMPTY = re.compile(rb"\s*0\s*(?:\(\s*\))?\s*;")
 _ENTRY = re.compile(rb'([\w.:-]+|"[^"]*")\s*\{|\b(\w+)(?=\s+(?:non)?uniform\b)|([{}])')
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """Mesh of a case, with faces of any number of corners.
-
-    points (P, 3) [m].   starts (F + 1,), corners : the corners of face f are ``corners[starts[f]:starts[f + 1]]``.
-    owner (F,), neighbour (I,) : cells; the first I faces lie inside.   patches : name -> first face, number of faces.
-    """
-
-    points: Array
-    starts: Whole
-    corners: Whole
-    owner: Whole
-    neighbour: Whole
-    patches: Mapping[str, tuple[int, int]]
-
-    @property
-    def cells(self) -> int:
-        """Number of cells."""
-        return int(self.owner.max(initial=-1)) + 1
-
-    def faces(self, patch: str) -> slice:
-        """Faces of a patch.
-
-        Raises
-        ------
-        TankError
-            No such patch.
-        """
-        if patch not in self.patches:
-            raise TankError(f"the mesh has no patch {patch!r}; it has {', '.join(self.patches)}.")
-        first, count = self.patches[patch]
-        return slice(first, first + count)
 
 
 @dataclass(frozen=True)
@@ -177,7 +142,7 @@ def _opened(path: Path) -> _File:
     )
 
 
-def read_mesh(case: Path) -> Mesh:
+def read_mesh(case: Path) -> PolyMesh:
     """The mesh in ``constant/polyMesh`` of a case.
 
     Raises
@@ -189,33 +154,50 @@ def read_mesh(case: Path) -> Mesh:
     """
     folder = case / "constant" / "polyMesh"
     points = _opened(folder / "points")
-    starts, corners = _faces(_opened(folder / "faces"))
+    faces = _faces(_opened(folder / "faces"))
     owner, neighbour = (_labels(_opened(folder / name)) for name in ("owner", "neighbour"))
-    mesh = Mesh(
+    patches = _patches(_opened(folder / "boundary"))
+    mesh = PolyMesh(
         points.listed(points.begin, width=3)[0].reshape(-1, 3).astype(float),
-        starts,
-        corners,
+        faces,
         owner,
         neighbour,
-        _patches(_opened(folder / "boundary")),
+        patches,
+        # The cell of the largest number may own no face: all its faces lie inside.
+        int(max(owner.max(initial=-1), neighbour.max(initial=-1))) + 1,
     )
-    whole = len(owner) == len(starts) - 1 >= len(neighbour) and corners.max(initial=-1) < len(mesh.points)
-    if not whole or any(first + count > len(owner) for first, count in mesh.patches.values()):
+    begins = np.cumsum([len(neighbour), *(patch.count for patch in patches)])
+    closed = np.array_equal(begins, [*(patch.start for patch in patches), len(owner)])
+    if not closed or len(owner) != len(faces) or faces.max() >= len(mesh.points):
         raise TankError(f"the files of {folder} do not fit each other. Run the case again in a fresh folder.")
     return mesh
 
 
-def _labels(file: _File) -> Whole:
+def _labels(file: _File) -> Labels:
     return file.listed(file.begin, whole=True)[0].astype(np.int64)
 
 
-def _faces(file: _File) -> tuple[Whole, Whole]:
-    if file.binary:
-        if file.kind != "faceCompactList":
-            raise file.damaged(f"binary faces of class {file.kind} are not known")
-        starts, after = file.listed(file.begin, whole=True)
-        corners, _ = file.listed(after, whole=True)
-        return starts.astype(np.int64), corners.astype(np.int64)
+def _faces(file: _File) -> Labels:
+    """Faces (F, W) of W corners at most, closed by -1."""
+    count, corners = _compact(file) if file.binary else _listed(file)
+    if not len(count) or count.min() < 3 or count.sum() != len(corners):
+        raise file.damaged(f"{len(corners)} corners do not make its {len(count)} faces")
+    faces = np.full((len(count), max(4, int(count.max()))), -1, dtype=np.int64)
+    faces[np.arange(faces.shape[1]) < count[:, None]] = corners
+    return faces
+
+
+def _compact(file: _File) -> tuple[Labels, Labels]:
+    """Number of corners of each face (F,), and the corners of all, from offsets and corners."""
+    if file.kind != "faceCompactList":
+        raise file.damaged(f"binary faces of class {file.kind} are not known")
+    starts, after = file.listed(file.begin, whole=True)
+    corners, _ = file.listed(after, whole=True)
+    return (starts[1:] - starts[:-1]).astype(np.int64), corners.astype(np.int64)
+
+
+def _listed(file: _File) -> tuple[Labels, Labels]:
+    """The same from a list of lists."""
     found = _COUNT.match(file.content, file.begin)
     if found is None:
         raise file.damaged("its list of faces is missing")
@@ -223,18 +205,19 @@ def _faces(file: _File) -> tuple[Whole, Whole]:
     lists = re.findall(rb"\d+\s*\(([^)]*)\)", file.content[found.end() : stop.end() if stop else None])
     if stop is None or len(lists) != int(found[1]):
         raise file.damaged(f"its list of {int(found[1])} faces holds {len(lists)}")
-    faces = [np.array(one.split(), dtype=np.int64) for one in lists]
-    return np.r_[0, np.cumsum([len(one) for one in faces])], np.concatenate(faces)
+    faces = [one.split() for one in lists]
+    return np.array([len(one) for one in faces]), np.array([corner for one in faces for corner in one], dtype=np.int64)
 
 
-def _patches(file: _File) -> dict[str, tuple[int, int]]:
+def _patches(file: _File) -> tuple[Patch, ...]:
     text = file.content[file.begin :].decode("utf-8", "replace")
-    out: dict[str, tuple[int, int]] = {}
+    out = []
     for name, body in re.findall(r"([\w.:-]+)\s*\{([^}]*)\}", text):
-        counts = [re.search(rf"\b{key}\s+(\d+)\s*;", body) for key in ("startFace", "nFaces")]
-        if counts[0] and counts[1]:
-            out[name] = (int(counts[0][1]), int(counts[1][1]))
-    return out
+        entries = dict(re.findall(r"\b(type|startFace|nFaces)\s+([\w.:-]+)\s*;", body))
+        if len(entries) < 3:
+            raise file.damaged(f"patch {name} lacks its type, startFace or nFaces")
+        out.append(Patch(name, entries["type"], int(entries["startFace"]), int(entries["nFaces"])))
+    return tuple(out)
 
 
 def read_field(path: Path) -> Field:

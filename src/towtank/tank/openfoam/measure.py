@@ -15,7 +15,9 @@ from towtank.frames import Array
 from towtank.tank.openfoam.case import Case
 from towtank.tank.openfoam.dictionary import times
 from towtank.tank.openfoam.distribution import COURANT, Y_PLUS, Distribution, shares
-from towtank.tank.openfoam.fields import Field, Mesh, Whole, read_field, read_mesh
+from towtank.tank.openfoam.fields import Field, read_field, read_mesh
+from towtank.tank.openfoam.mesh.poly import PolyMesh
+from towtank.tank.openfoam.mesh.quality import cell_volumes, face_vectors
 
 SCHEMA = "towtank/case-distribution/1"
 FILE = "distribution.json"
@@ -58,19 +60,21 @@ def measured(case: Case, time: Path) -> Distribution:
     return replace(found, missing=tuple(missing))
 
 
-def _with_y_plus(found: Distribution, case: Case, mesh: Mesh, y_plus: Field) -> Distribution:
+def _with_y_plus(found: Distribution, case: Case, mesh: PolyMesh, y_plus: Field) -> Distribution:
     rows, area = of_walls(mesh, y_plus, case.walls)
     return replace(found, y_plus=rows, area=area)
 
 
-def _with_courant(found: Distribution, case: Case, mesh: Mesh, flux: Field) -> Distribution:
+def _with_courant(found: Distribution, case: Case, mesh: PolyMesh, flux: Field) -> Distribution:
     if case.line is None:
         return found
     numbers = courant_numbers(mesh, flux, case.line.step)
     return replace(found, courant=shares(numbers, np.ones(mesh.cells), COURANT))
 
 
-def of_walls(mesh: Mesh, y_plus: Field, walls: Iterable[str]) -> tuple[dict[str, tuple[float, ...]], dict[str, float]]:
+def of_walls(
+    mesh: PolyMesh, y_plus: Field, walls: Iterable[str]
+) -> tuple[dict[str, tuple[float, ...]], dict[str, float]]:
     """Shares of y+ by area of each wall, and the areas [m2].
 
     Raises
@@ -78,76 +82,25 @@ def of_walls(mesh: Mesh, y_plus: Field, walls: Iterable[str]) -> tuple[dict[str,
     TankError
         The mesh, or the field, has no such wall.
     """
-    size = np.linalg.norm(face_areas(mesh), axis=1)
+    size = np.linalg.norm(face_vectors(mesh)[1], axis=1)
     rows, area = {}, {}
     for patch in walls:
         if patch not in y_plus.patches:
             raise TankError(f"the field says nothing of the wall {patch}")
-        weights = size[mesh.faces(patch)]
+        weights = size[mesh.patch(patch).faces]
         rows[patch] = shares(y_plus.on(patch, len(weights)), weights, Y_PLUS)
         area[patch] = float(weights.sum())
     return rows, area
 
 
-def courant_numbers(mesh: Mesh, flux: Field, step: float) -> Array:
+def courant_numbers(mesh: PolyMesh, flux: Field, step: float) -> Array:
     """Courant number (cells,): half the sum of |flux| [m3/s] over the faces, times ``step`` [s], over the volume.
 
     Source     OpenFOAM v1912, CourantNo.H. In a moving mesh ``phi`` is relative to it.
     """
     inner = len(mesh.neighbour)
-    through = [flux.within(inner), *(flux.on(name, count) for name, (_, count) in _in_order(mesh))]
+    through = [flux.within(inner), *(flux.on(patch.name, patch.count) for patch in mesh.patches)]
     size = np.abs(np.concatenate(through))
     total = np.bincount(mesh.owner, size, mesh.cells) + np.bincount(mesh.neighbour, size[:inner], mesh.cells)
-    return np.asarray(0.5 * total * step / cell_volumes(mesh))
-
-
-def _in_order(mesh: Mesh) -> list[tuple[str, tuple[int, int]]]:
-    return sorted(mesh.patches.items(), key=lambda item: item[1][0])
-
-
-def face_areas(mesh: Mesh) -> Array:
-    """Area vectors (F, 3) [m2], from owner to neighbour: the sum of triangles about any point."""
-    _, area, face = _triangles(mesh)
-    return _over_faces(area, face, len(mesh.owner))
-
-
-def cell_volumes(mesh: Mesh) -> Array:
-    """Volumes (cells,) [m3]: pyramids from a point in each cell on the triangles of its faces."""
-    third, area, face = _triangles(mesh)
-    count, inner = len(mesh.owner), len(mesh.neighbour)
-    point = _centres(mesh, _over_faces(third, face, count) / np.bincount(face, minlength=count)[:, None])
-
-    def pyramids(cell: Whole, of: Whole) -> Array:
-        heights = np.einsum("ti,ti->t", third[of] - point[cell], area[of])
-        return np.asarray(np.bincount(cell, heights, mesh.cells))
-
-    inside = np.flatnonzero(face < inner)
-    outer = pyramids(mesh.owner[face], np.arange(len(face)))
-    return np.asarray((outer - pyramids(mesh.neighbour[face[inside]], inside)) / 3.0)
-
-
-def _centres(mesh: Mesh, middle: Array) -> Array:
-    """A point in each cell (cells, 3) [m]: the mean of its faces' middles."""
-    inner = len(mesh.neighbour)
-    number = np.bincount(mesh.owner, minlength=mesh.cells) + np.bincount(mesh.neighbour, minlength=mesh.cells)
-    sums = [
-        np.bincount(mesh.owner, middle[:, i], mesh.cells) + np.bincount(mesh.neighbour, middle[:inner, i], mesh.cells)
-        for i in range(3)
-    ]
-    return np.asarray(np.stack(sums, axis=1) / number[:, None])
-
-
-def _triangles(mesh: Mesh) -> tuple[Array, Array, Whole]:
-    """Centres (T, 3) [m], area vectors (T, 3) [m2] and faces (T,) of triangles from edge to middle of each face."""
-    corners = np.diff(mesh.starts)
-    face = np.repeat(np.arange(len(corners)), corners)
-    here = mesh.points[mesh.corners]
-    following = np.arange(len(face)) + 1
-    following[mesh.starts[1:] - 1] = mesh.starts[:-1]
-    there = here[following]
-    middle = _over_faces(here, face, len(corners))[face] / corners[face][:, None]
-    return (here + there + middle) / 3.0, 0.5 * np.cross(here - middle, there - middle), face
-
-
-def _over_faces(values: Array, face: Whole, count: int) -> Array:
-    return np.stack([np.bincount(face, values[:, i], count) for i in range(3)], axis=1)
+    _, volume = cell_volumes(mesh, *face_vectors(mesh))
+    return np.asarray(0.5 * total * step / volume)

@@ -22,13 +22,13 @@ from towtank.errors import InputError, TankError
 from towtank.frames import Array
 from towtank.plan.kinds import CaptiveTest
 from towtank.provenance import digest
+from towtank.tank.openfoam.fields import read_mesh
 from towtank.tank.openfoam.find import require
-from towtank.tank.openfoam.mesh.foam import read_mesh
 from towtank.tank.openfoam.mesh.layers import columns, layers_of
 from towtank.tank.openfoam.mesh.poly import Patch, PolyMesh
 from towtank.tank.openfoam.mesh.quality import quality
 from towtank.tank.openfoam.mesh.snappy import SnappySettings, dictionaries, told
-from towtank.tank.openfoam.mesh.snappy_run import make, meshing_time
+from towtank.tank.openfoam.mesh.snappy_run import make, meshing_time, templates
 from towtank.tank.openfoam.mesh.spacing import first_cell
 from towtank.tank.openfoam.mesh.stl import Surface, check_fit, read_surface
 
@@ -124,7 +124,7 @@ class SurfaceMesh:
         installation = require()
         heights = self.settings.heights(craft, speed, surface.edges > 0)
         values = dictionaries(surface, craft, self.settings, heights)
-        key = digest([surface.digest, values, f"{installation.version} {installation.kind}"])
+        key = digest([surface.digest, templates(), values, f"{installation.version} {installation.kind}"])
         place = store / f"{self.label}-{key}"
         store.mkdir(parents=True, exist_ok=True)
         with _alone(store / f".{place.name}.lock"):
@@ -163,7 +163,7 @@ def measured(folder: Path, surface: Surface, craft: Craft, speed: float, heights
     Raises
     ------
     TankError
-        No solver can run on it: it has no wall, or cells that are no cells.
+        It cannot be read, or no solver can run on it: it has no wall, or cells that are no cells.
     """
     mesh = read_mesh(folder)
     patch = next((patch for patch in mesh.patches if patch.name == WALL and patch.count), None)
@@ -203,7 +203,7 @@ def measured(folder: Path, surface: Surface, craft: Craft, speed: float, heights
 
 def _parts(mesh: PolyMesh, patch: Patch, craft: Craft) -> dict[str, NDArray[np.intp]]:
     """Faces of the wall on the hull of ``craft``, and those beyond it: fins have few, which count for much."""
-    corners = mesh.faces[patch.start : patch.start + patch.count]
+    corners = mesh.faces[patch.faces]
     x, y, z = np.moveaxis(mesh.points[corners[:, :3]].mean(axis=1), -1, 0)
     beyond = np.hypot(y, z) > craft.profile.radius(craft.origin_from_nose - x) + BEYOND * craft.diameter
     rows = {"hull": np.flatnonzero(~beyond), "appendages": np.flatnonzero(beyond)}

@@ -214,8 +214,7 @@ def united(meshes: Sequence[PolyMesh]) -> PolyMesh:
     chosen = [(k, part) for k, part in enumerate(parts)]
     patches, start = [], sum(map(len, neighbour))
     for name in sorted(kinds, key=lambda name: name != PATCH):
-        found = [(k, slice(p.start, p.start + p.count)) for k, mesh in enumerate(meshes) for p in mesh.patches
-                 if p.name == name]  # fmt: skip
+        found = [(k, p.faces) for k, mesh in enumerate(meshes) for p in mesh.patches if p.name == name]
         count = sum(part.stop - part.start for _, part in found)
         patches.append(Patch(name, kinds[name], start, count))
         chosen, start = chosen + found, start + count
@@ -249,7 +248,7 @@ def _renamed(patch: Patch) -> Patch:
 
 def _rim_cells(body: PolyMesh) -> Labels:
     rim = body.patch(PATCH)
-    return np.unique(body.owner[rim.start : rim.start + rim.count])
+    return np.unique(body.owner[rim.faces])
 
 
 def _rim_size(body: PolyMesh) -> float:
@@ -272,7 +271,7 @@ def _check_clearance(
 
     cell : of the background [m].
     """
-    walls = [body.faces[p.start : p.start + p.count].ravel() for p in body.patches if p.kind == "wall"]
+    walls = [body.faces[p.faces].ravel() for p in body.patches if p.kind == "wall"]
     wall = np.unique(np.concatenate(walls))
     out = float(radius_of(craft, shape, _moved(body.points[wall[wall >= 0]], poses)).max())
     if out > found.cavity:

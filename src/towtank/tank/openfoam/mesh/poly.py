@@ -28,6 +28,11 @@ class Patch:
     start: int
     count: int
 
+    @property
+    def faces(self) -> slice:
+        """Where its faces lie among those of the mesh."""
+        return slice(self.start, self.start + self.count)
+
 
 @dataclass(frozen=True)
 class PolyMesh:

@@ -24,6 +24,11 @@ LOOK = 0.2
 _FINISHED = re.compile(r"Finished meshing in = (\S+) s")
 
 
+def templates() -> dict[str, str]:
+    """Text of each template of the mesh, by the name of its file in ``system``."""
+    return {path.name: path.read_text(encoding="utf-8") for path in sorted((TEMPLATES / "system").iterdir())}
+
+
 def make(
     folder: Path,
     surface: Path,
@@ -40,11 +45,9 @@ def make(
     """
     import jinja2
 
-    engine = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), undefined=jinja2.StrictUndefined, keep_trailing_newline=True
-    )
-    for path in sorted((TEMPLATES / "system").iterdir()):
-        write_text(folder / "system" / path.name, engine.get_template(f"system/{path.name}").render(values))
+    engine = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
+    for name, text in templates().items():
+        write_text(folder / "system" / name, engine.from_string(text).render(values))
     (folder / "constant" / "triSurface").mkdir(parents=True)
     shutil.copyfile(surface, folder / "constant" / "triSurface" / "hull.stl")
     programs = ["blockMesh", *(["surfaceFeatureExtract"] if values["edges"] else []), "snappyHexMesh", "renumberMesh"]
