@@ -123,7 +123,7 @@ def test_a_full_disk_leaves_no_half_written_case(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("towtank.tank.openfoam.case.write_mesh", full)
+    monkeypatch.setattr("towtank.tank.openfoam.meshing.write_mesh", full)
     with pytest.raises(ArtefactError, match="No space left"):
         write_case(tmp_path / "case", BARE, TESTS["straight"], TINY, QUICK)
     assert list(tmp_path.iterdir()) == []
