@@ -182,6 +182,15 @@ def test_a_diverged_steady_case_is_told_as_one(drift, tmp_path):
     assert not (drift.folder / "outcome.json").exists()
 
 
+def test_a_diverged_steady_case_is_tried_with_one_more_pressure_solution(drift, tmp_path):
+    """The stand-in diverges unless the correctors are there."""
+    kept = "if 'Correctors 1;' not in (case / 'system/fvSolution').read_text():\n    os.kill(os.getpid(), 8)\n"
+    case, outcome = solve(drift, stand_in(tmp_path, kept), Silent())
+    assert outcome.retries == ("diverged; run with one further solution of each pressure equation",)
+    assert case.numerics.non_orthogonal == 1
+    assert read_case(case.folder) == case
+
+
 def test_a_diverged_motion_is_tried_with_half_the_step_and_then_with_euler(sway, tmp_path):
     """The stand-in diverges unless the scheme is Euler."""
     gentle = "if 'timeScheme      Euler' not in (case / 'system/fvSchemes').read_text():\n    os.kill(os.getpid(), 8)\n"

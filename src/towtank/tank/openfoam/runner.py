@@ -11,7 +11,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,12 +23,13 @@ from towtank.progress import Progress
 from towtank.symbols import LOADS
 from towtank.tank.imported.joining import ordered
 from towtank.tank.imported.openfoam import read_forces
-from towtank.tank.openfoam.case import MARGIN_OF_TIME, Case, write_document, write_motion
+from towtank.tank.openfoam.case import MARGIN_OF_TIME, Case
 from towtank.tank.openfoam.dictionary import set_entry, times
 from towtank.tank.openfoam.find import Installation
 from towtank.tank.openfoam.formulation import Arm, load_limit
 from towtank.tank.openfoam.measure import keep
 from towtank.tank.openfoam.monitor import Log, changes, flat
+from towtank.tank.openfoam.retry import next_rung
 
 SCHEMA = "towtank/case-outcome/1"
 LOCK = ".lock"
@@ -98,7 +99,7 @@ def solve(
                 broken += 1
                 retries = (*retries, _drop_last(case))
                 continue
-            changed = _next_rung(case) if _diverged(log, code) else None
+            changed = next_rung(case) if _diverged(log, code) else None
             if changed is None:
                 raise TankError(_failure(case, log, code))
             case, words = changed
@@ -305,41 +306,6 @@ def _drop_last(case: Case) -> str:
     for folder in (case.folder, *case.folder.glob("processor*")):
         shutil.rmtree(folder / last, ignore_errors=True)
     return f"time {last} on file could not be read and was dropped"
-
-
-def _next_rung(case: Case) -> tuple[Case, str] | None:
-    """The case with the next gentler setting, cleared to start again, and what was changed; None at the last."""
-    if case.line is None:
-        return None
-    line, numerics = case.line, case.numerics
-    half = replace(
-        line,
-        step=line.step / 2,
-        lead=2 * line.lead,
-        recorded=2 * line.recorded,
-        every=2 * line.every,
-        per_period=2 * line.per_period,
-    )
-    if numerics.scheme == "Euler":
-        return None
-    first = line.per_period < 2 * max(numerics.steps, case.test.samples)
-    scheme = numerics.scheme if first else "Euler"
-    words = f"diverged with {line.per_period} steps a period; run with {half.per_period}"
-    changed = replace(case, line=half, numerics=replace(numerics, scheme=scheme))
-    _clear(changed)
-    set_entry(case.folder / "system" / "controlDict", "deltaT", f"{half.step:.15g}")
-    if not first:
-        set_entry(case.folder / "system" / "fvSchemes", "timeScheme", "Euler")
-        words += " and Euler, which is of first order in time"
-    write_motion(changed)
-    write_document(changed)
-    return changed, words
-
-
-def _clear(case: Case) -> None:
-    """Remove what the solver wrote, so that the case starts from its first field."""
-    for path in (*times(case.folder), *case.folder.glob("processor*"), case.folder / "postProcessing"):
-        shutil.rmtree(path, ignore_errors=True)
 
 
 def _finish(case: Case, installation: Installation) -> None:

@@ -39,7 +39,7 @@ PHYSICS = 1
 
 PRESETS: dict[str, tuple[MeshSettings, Numerics]] = {
     "draft": (MeshSettings(along=60, around=16, out=32, y_plus=60.0, far=2.5), Numerics()),
-    "standard": (MeshSettings(along=80, around=24, out=40, y_plus=60.0, far=2.5), Numerics()),
+    "standard": (MeshSettings(along=80, around=24, out=40, y_plus=60.0, far=2.5), Numerics(non_orthogonal=1)),
     "fine": (
         MeshSettings(along=120, around=36, out=60, y_plus=60.0, far=2.5),
         Numerics(steps=200, iterations=1500, non_orthogonal=1),
