@@ -22,7 +22,7 @@ help:
 	@echo "make lint      the first three of these"
 	@echo "make validate  the longer checks; rewrites the tables in validation/ and that of the report"
 	@echo "make validate-slurm  work shared by jobs of a real one-node Slurm; as root, with Debian's Slurm installed"
-	@echo "make validate-openfoam  the bare SUBOFF hull by RANS, one change of set-up at a time, and on three meshes; an hour"
+	@echo "make validate-openfoam  SUBOFF by RANS, one change of set-up at a time, with and without fins, on three meshes, overset; three hours"
 	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
 	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
 	@echo "make bench-derive  identification of 200 runs of 2000 samples, written to bench/derive.json"
@@ -71,6 +71,7 @@ validate-slurm: $(VENV)/.engine $(VENV)/.tools
 
 validate-openfoam: $(VENV)/.tools
 	$(BIN)/python validation/openfoam_suboff.py
+	$(BIN)/python validation/openfoam_slopes.py
 	$(BIN)/python validation/openfoam_grid.py
 	$(BIN)/python validation/openfoam_overset.py
 
