@@ -19,6 +19,7 @@ from towtank.errors import TankError
 from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import Drift, Sway
 from towtank.progress import Silent
+from towtank.tank import identity
 from towtank.tank.openfoam import find as finding
 from towtank.tank.openfoam.case import read_case, write_case
 from towtank.tank.openfoam.dictionary import entry, times
@@ -326,7 +327,9 @@ def test_a_campaign_keeps_its_cases_below_the_study_and_goes_on_from_them(tmp_pa
 
 def test_cores_and_folders_do_not_change_the_identity_of_a_run(tmp_path, monkeypatch):
     monkeypatch.setattr("towtank.tank.openfoam.tank.require", lambda: stand_in(tmp_path))
-    from towtank.tank.identity import run_id
+    # Contexts are kept for the life of a process, in which an installation does not change but here.
+    monkeypatch.setattr(identity, "_context_kept", identity._context_of)
+    run_id = identity.run_id
 
     base = OpenFoamTank()
     assert run_id(BARE, DRIFT, base) == run_id(BARE, DRIFT, OpenFoamTank(cores=2, where=tmp_path))
