@@ -33,20 +33,21 @@ def y_plus(rows: Rows, level: str = "rans", ax: Axes | None = None) -> Axes:
     ax.axvspan(Y_PLUS.index(30.0) + 0.5, Y_PLUS.index(300.0) + 0.5, color=BAND, alpha=0.3, linewidth=0,
                label="wall functions: 30 to 300")  # fmt: skip
     _bars(ax, rows, Y_PLUS)
-    frame(ax, "y+ of the first cell [-]", "share of the wall area [%]", zero=False)
-    ax.grid(False, axis="x")
-    head(ax, "y+ on the walls", level, _words(rows))
-    legend(ax)
-    return ax
+    return _framed(ax, rows, level, "y+ on the walls", "y+ of the first cell [-]", "share of the wall area [%]")
 
 
 def courant(rows: Rows, level: str = "rans", ax: Axes | None = None) -> Axes:
     """Share of the cells [%] in each bin of the Courant number at the end of a moving run, as ``y_plus``."""
     ax = new_axes(ax, width=4.6, height=2.9)
     _bars(ax, rows, COURANT)
-    frame(ax, "Courant number of the cell [-]", "share of the cells [%]", zero=False)
+    title = "Courant number at the end of a run"
+    return _framed(ax, rows, level, title, "Courant number of the cell [-]", "share of the cells [%]")
+
+
+def _framed(ax: Axes, rows: Rows, level: str, title: str, across: str, up: str) -> Axes:
+    frame(ax, across, up, zero=False)
     ax.grid(False, axis="x")
-    head(ax, "Courant number at the end of a run", level, _words(rows))
+    head(ax, title, level, _words(rows))
     legend(ax)
     return ax
 

@@ -20,8 +20,15 @@ MODELS: dict[str, tuple[str, ...]] = {
     "LRR": ("k", "R", "epsilon", "nut"),
     "SSG": ("k", "R", "epsilon", "nut"),
 }
-"""Turbulence model -> its fields. kOmegaSSTLM is the transition model of Langtry and Menter, LaunderSharmaKE a model of
-low Reynolds number, LRR and SSG are Reynolds-stress models. None corrects for curvature: v1912 holds none that does."""
+"""Turbulence model -> its fields. None corrects for curvature: v1912 holds none that does.
+
+Source     OpenFOAM's implementations of: kEpsilon, Launder and Spalding (1974); kOmegaSST, Menter et al. (2003);
+           kOmegaSSTLM, the transition model of Langtry and Menter (2009); realizableKE, Shih et al. (1995);
+           RNGkEpsilon, Yakhot et al. (1992); ShihQuadraticKE, Shih, Zhu and Lumley (1993); LaunderSharmaKE, of low
+           Reynolds number, Launder and Sharma (1974); SpalartAllmaras (1994); LRR and SSG, Reynolds-stress models,
+           Launder, Reece and Rodi (1975), Speziale, Sarkar and Gatski (1991).
+Valid      Which of them is near experiment on SUBOFF: docs/openfoam-accuracy.md.
+"""
 
 RESOLVED_ONLY = ("kOmegaSSTLM", "LaunderSharmaKE")
 """Models without a wall function."""
