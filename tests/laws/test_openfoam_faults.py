@@ -327,8 +327,6 @@ def test_a_campaign_keeps_its_cases_below_the_study_and_goes_on_from_them(tmp_pa
 
 def test_cores_and_folders_do_not_change_the_identity_of_a_run(tmp_path, monkeypatch):
     monkeypatch.setattr("towtank.tank.openfoam.tank.require", lambda: stand_in(tmp_path))
-    # Contexts are kept for the life of a process, in which an installation does not change but here.
-    monkeypatch.setattr(identity, "_context_kept", identity._context_of)
     run_id = identity.run_id
 
     base = OpenFoamTank()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Hashable
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -52,18 +50,7 @@ def wetted_shape(craft: Craft) -> dict[str, Any]:
 
 
 def _context(craft: Craft, tank: Tank) -> str:
-    try:
-        return _context_kept(craft, cast(Hashable, tank))
-    except TypeError:  # a tank with settings that cannot be hashed
-        return _context_of(craft, tank)
-
-
-@functools.lru_cache(maxsize=8)
-def _context_kept(craft: Craft, tank: Hashable) -> str:
-    return _context_of(craft, cast(Tank, tank))
-
-
-def _context_of(craft: Craft, tank: Tank) -> str:
+    """Hash of craft and tank. Not kept: settings tell of files and programs that may change while a process lives."""
     return digest([wetted_shape(craft), type(tank).__name__, tank.level, tank.settings()], 16)
 
 
