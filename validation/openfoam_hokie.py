@@ -1,7 +1,7 @@
 """The whole campaign of ``hokie`` in OpenFOAM beside the fast tank's: its cost, and the derivatives of both.
 
-Run as a script with the folder of a finished study, it rewrites ``validation/openfoam_hokie.csv``:
-``towtank run hokie --tank openfoam --out FOLDER``, then ``openfoam_hokie.py FOLDER``. The study has 113 runs.
+``towtank run hokie --tank openfoam --out FOLDER`` and ``towtank grid hokie --tank openfoam --out GRID``, then
+``openfoam_hokie.py FOLDER GRID`` rewrites ``validation/openfoam_hokie.csv`` and ``openfoam_hokie_grid.csv``.
 """
 
 from __future__ import annotations
@@ -13,14 +13,19 @@ from pathlib import Path
 import numpy as np
 
 import towtank as tt
+from openfoam_grid import HEAD as GRID_HEAD
+from openfoam_grid import rows as grid_rows
 from tables import write_table
 from towtank.artefact import read_json
-from towtank.derive.files import read_derivatives
+from towtank.grid.files import read_grid
+from towtank.grid.study import GridStudy
+from towtank.tank.files import read_run
 from towtank.tank.openfoam.case import read_case
 from towtank.tank.openfoam.runner import SCHEMA as OUTCOME
 
 TARGET = Path(__file__).with_suffix(".csv")
-HEAD = ("what", "name", "openfoam", "deviation", "fast_tank", "deviation_fast")
+HEAD = ("what", "name", "openfoam", "deviation", "of_mesh", "fast_tank", "deviation_fast")
+MESHES = TARGET.with_name("openfoam_hokie_grid.csv")
 
 
 def cost(study: Path) -> dict[str, tuple[int, float]]:
@@ -33,27 +38,29 @@ def cost(study: Path) -> dict[str, tuple[int, float]]:
     return out
 
 
-def rows(study: Path) -> Iterator[tuple[str, ...]]:
+def rows(study: Path, grid: GridStudy) -> Iterator[tuple[str, ...]]:
     """Cost by kind of run, then the terms, SI; deviations are standard uncertainties, all shares together."""
-    dear = read_derivatives(study / "derivatives.json")
+    dear = tt.derive([read_run(path) for path in sorted(study.glob("runs/*/run.nc"))], grid=grid)
     found = cost(study)
     for kind, (runs, seconds) in found.items():
-        yield ("cost", kind, str(runs), "", f"{seconds:.0f}", "")
+        yield ("cost", kind, str(runs), "", "", f"{seconds:.0f}", "")
     total = sum(seconds for _, seconds in found.values())
-    yield ("cost", "all", str(sum(runs for runs, _ in found.values())), "", f"{total:.0f}", "")
-    yield ("cost", "CPU seconds a derivative", "", "", f"{total / len(dear.names):.0f}", "")
+    yield ("cost", "all", str(sum(runs for runs, _ in found.values())), "", "", f"{total:.0f}", "")
+    yield ("cost", "CPU seconds a derivative", "", "", "", f"{total / len(dear.names):.0f}", "")
     cheap = tt.derive(tt.tow(tt.standard_plan(tt.read_craft("hokie")), tank=tt.FastTank()))
     one, other = _stated(dear), _stated(cheap)
     for name in sorted({*one} | {*other}):
-        yield ("term", name, *one.get(name, ("", "")), *other.get(name, ("", "")))
+        yield ("term", name, *one.get(name, ("", "", "")), *other.get(name, ("", "", ""))[:2])
 
 
-def _stated(d: tt.Derivatives) -> dict[str, tuple[str, str]]:
-    """Term -> value and its standard uncertainty."""
-    deviations = np.sqrt(np.diag(d.covariance))
-    return {name: (f"{v:.5g}", f"{s:.2g}") for name, v, s in zip(d.names, d.values, deviations, strict=True)}
+def _stated(d: tt.Derivatives) -> dict[str, tuple[str, str, str]]:
+    """Term -> value, its standard uncertainty, and the part of that which is the mesh's."""
+    whole, mesh = (np.sqrt(np.diag(c)) for c in (d.covariance, d.covariance_mesh))
+    return {n: (f"{v:.5g}", f"{s:.2g}", f"{m:.2g}") for n, v, s, m in zip(d.names, d.values, whole, mesh, strict=True)}
 
 
 if __name__ == "__main__":
-    place = Path(sys.argv[1])
-    write_table(TARGET, f"hokie, {place.name}; costs: runs and CPU seconds in the columns of values", HEAD, rows(place))
+    place, meshes = Path(sys.argv[1]), read_grid(Path(sys.argv[2]) / "grid.json")
+    title = f"hokie, {place.name}; costs: runs and CPU seconds in the columns of values"
+    write_table(TARGET, title, HEAD, rows(place, meshes))
+    write_table(MESHES, f"hokie, chosen {meshes.chosen}", GRID_HEAD, grid_rows(meshes))
