@@ -325,3 +325,30 @@ def test_a_motion_out_of_bounds_stops_with_its_reason_on_every_path(craft, monke
     assert done.ended[0] == reason
     assert np.all(np.isfinite(done.state))
     assert done.end_time[0] < 20.0
+
+
+def test_an_ordered_rate_of_turn_and_an_ordered_pitch_are_followed(go):
+    turn = replace(HELD, turning=1.0, turn=0.01)
+    lean = replace(HELD, pitching=1.0, pitch=-0.03)
+    done = go([Leg("turn", turn, 1500.0), Leg("lean", lean, 200.0)])
+    # r of a level craft; the roll in the turn makes the rate of heading differ by its cosine.
+    assert done.at("turn", "r", event=False)[0] == pytest.approx(0.01, rel=0.01)
+    assert done.at("turn", "psi", event=False)[0] > 1.5
+    assert done.at("lean", "theta", event=False)[0] == pytest.approx(-0.03, rel=0.1)
+
+
+def test_without_thrust_a_craft_slows_down_as_quadratic_drag_has_it(craft, go):
+    # u' = -k u^2 with k = -Xuu / (m - Xudot), so that u0 / u - 1 = k u0 t.
+    # A low CG pitches the craft a little while it slows down.
+    done = go([Leg("coast", replace(HELD, throttle=0.0), 20.0), Leg("astern", replace(HELD, throttle=-1.0), 10.0)])
+    k = -craft.derivatives["Xuu"] / craft.mass_matrix[0, 0]
+    u = done.at("coast", "u", event=False)[0]
+    assert u == pytest.approx(1.0 / (1.0 + 20.0 * k), rel=1e-5)
+    assert done.at("astern", "u", event=False)[0] < 1.0 / (1.0 + 30.0 * k)
+
+
+def test_feedback_of_sway_is_part_of_the_command(go, pilot):
+    turn = [Leg("turn", replace(HELD, heading=1.0), 6.0)]
+    plain, fed = go(turn), go(turn, pilot=replace(pilot, sway=5.0))
+    assert fed.at("turn", "slip", event=False)[0] != 0.0
+    assert abs(fed.at("turn", "psi", event=False)[0] - plain.at("turn", "psi", event=False)[0]) > 1e-3

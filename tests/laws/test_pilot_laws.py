@@ -72,7 +72,7 @@ def test_eigenvalues_of_the_design_are_those_of_the_flying_law():
         x, memory = list(y[:17]), list(y[17:])
         ordered = [getattr(orders, name) for name in ORDERS]
         out = command(system, observe(system, x, ordered, MATH), memory, ordered, MATH)
-        return np.array([*dynamics(system, x, mixing.fins(out.granted), MATH), *out.memory_rates])
+        return np.array([*dynamics(system, x, [*mixing.fins(out.granted), 1.0], MATH), *out.memory_rates])
 
     step, start = 1e-7, at(s.state, s.memory)
     slope = np.array([(rates(start + step * e) - rates(start - step * e)) / (2.0 * step) for e in np.eye(20)]).T
@@ -211,7 +211,7 @@ FINS = allocation(synthetic.craft())
 SWITCH = st.sampled_from([0.0, 1.0])
 ANGLE = st.floats(-1.2, 1.2)
 LIMITED = {"lookahead": st.floats(1.0, 40.0)} | dict.fromkeys(
-    ("piloted", "steer", "track", "dive", "damp_roll"), SWITCH
+    ("piloted", "steer", "track", "dive", "damp_roll", "turning", "pitching"), SWITCH
 )
 A_CASE = st.tuples(
     st.fixed_dictionaries({name: LIMITED.get(name, ANGLE) for name in ORDERS}),
@@ -366,7 +366,7 @@ def test_a_pilot_file_with_no_speed_is_refused(tmp_path):
 
 
 def test_the_numbers_of_the_law_are_named_in_order():
-    assert (GAINS[0], GAINS[-1], len(GAINS)) == ("speed", "reversal", 18)
+    assert (GAINS[0], GAINS[-1], len(GAINS)) == ("speed", "reversal", 21)
     assert ORDERS[0] == "piloted"
     assert all(isinstance(getattr(NO_PILOT, name), float) for name in GAINS)
     assert all(isinstance(getattr(Orders(), name), float) for name in ORDERS)

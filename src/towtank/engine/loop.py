@@ -25,9 +25,12 @@ MEMORY = ("trim_rudder", "trim_elevator", "guidance")
 
 _POSE = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r")
 _DERIVED = (
-    "speed", "drift", "turn", "sink", "level_speed", "ahead", "along", "across", "fin_square", "fin_largest", "fin_use",
+    "speed", "drift", "turn", "sink", "level_speed", "ahead", "slip", "plunge", "along", "across", "fin_square",
+    "fin_largest", "fin_use",
 )  # fmt: skip
 _HELD = ("rudder", "elevator", "aileron", "heading", *MEMORY, "fin_travel")
+SEEN = {"u": "ahead", "v": "slip", "w": "plunge"}
+"""Channels that the pilot sees under another name."""
 _FLOOR = 1e-30
 """Added below a root or to a divisor that may be zero; far below the square of any number that matters."""
 
@@ -56,9 +59,10 @@ def channels(fins: int) -> tuple[str, ...]:
     """Names of the channels, SI.
 
     x y z phi theta psi (unwrapped) u v w p q r, delta1...: the state.   speed over ground; drift angle atan2(-v, u);
-    turn, the rate of heading; sink, the rate of depth; level_speed, the speed along the horizontal; ahead, the speed
-    through the water along x; along and across, the distances from the start of the leg's line and off it;
-    fin_square, the mean square of the fin angles; fin_largest; fin_use, the largest share of its limit that a fin uses.
+    turn, the rate of heading; sink, the rate of depth; level_speed, the speed along the horizontal; ahead, slip,
+    plunge, the speeds through the water along x, y, z; along and across, the distances from the start
+    of the leg's line and off it; fin_square, the mean square of the fin angles; fin_largest; fin_use, the largest share
+    of its limit that a fin uses.
     Then what the loop keeps: the command granted, the heading wanted, the memory, and fin_travel, the mean angle swept.
     """
     return (*_POSE, *(f"delta{i + 1}" for i in range(fins)), *_DERIVED, *_HELD)
@@ -82,6 +86,7 @@ def observe(s: System, x: Vector, orders: Vector, ops: Ops) -> list[Scalar]:
     phi, psi = ops.atan2(J1[2][1], J1[2][2]), ops.atan2(east, north)
     theta = ops.atan2(-J1[2][0], ops.sqrt(level2 + _FLOOR))
     speed2 = u * u + v * v + w * w
+    drift = product_transposed(J1, s.current)
     sink = J1[2][0] * u + J1[2][1] * v + J1[2][2] * w
     o = _orders(orders)
     squares = [d * d for d in delta]
@@ -95,7 +100,9 @@ def observe(s: System, x: Vector, orders: Vector, ops: Ops) -> list[Scalar]:
         "turn": (J1[2][1] * q + J1[2][2] * r) / (level2 + _FLOOR),
         "sink": sink,
         "level_speed": ops.sqrt(ops.fmax(speed2 - sink * sink, 0.0) + _FLOOR),
-        "ahead": u - product_transposed(J1, s.current)[0],
+        "ahead": u - drift[0],
+        "slip": v - drift[1],
+        "plunge": w - drift[2],
         "along": along(o, x[0], x[1], ops),
         "across": across(o, x[0], x[1], ops),
         "fin_square": s.fin_share * sum(squares[1:], squares[0]),
@@ -109,21 +116,21 @@ def command(s: System, seen: Vector, memory: Vector, orders: Vector, ops: Ops) -
     """What the pilot grants, from the channels ``seen`` (``observed`` or more), its ``memory`` (3) and ``orders``."""
     fins = s.constants.fins
     named = dict(zip(channels(len(fins.max_angle)), seen, strict=False))
-    eyes = Seen(u=named["ahead"], **{name: named[name] for name in Seen._fields if name != "u"})
+    eyes = Seen(**{name: named[SEEN.get(name, name)] for name in Seen._fields})
     return steer(s.pilot, fins.mixing, fins.max_angle, _orders(orders), eyes, memory, ops)
 
 
 def dynamics(s: System, x: Vector, asked: Vector, ops: Ops) -> list[Scalar]:
-    """Rates of the state ``x`` (13 + n) with fin angles ``asked`` (n) held."""
-    return right_hand_side_quaternion(s.constants, x, asked, s.thrust, s.current, ops)
+    """Rates of the state ``x`` (13 + n) with ``asked`` (n + 1) held: fin angles and throttle."""
+    return right_hand_side_quaternion(s.constants, x, asked[:-1], s.thrust * asked[-1], s.current, ops)
 
 
-def load_through_water(s: System, x: Vector, ops: Ops) -> list[Scalar]:
+def load_through_water(s: System, x: Vector, throttle: Scalar, ops: Ops) -> list[Scalar]:
     """The bracket of eq. 2.9 (6,) [N, N m] in the state ``x`` (13 + n): what accelerates the craft in the water."""
     J1 = quaternion_matrix(x[3:7])
     drift = product_transposed(J1, s.current)
     nu = [*(a - b for a, b in zip(x[7:10], drift, strict=True)), *x[10:13]]
-    return total_load(s.constants, nu, J1[2], x[13:], s.thrust, ops)
+    return total_load(s.constants, nu, J1[2], x[13:], s.thrust * throttle, ops)
 
 
 def _orders(values: Sequence[Any]) -> Any:

@@ -19,11 +19,13 @@ from towtank.engine.run import Arrays
 from towtank.frames import Array
 from towtank.model.algebra import MATH, NUMPY, Ops, product
 from towtank.pilot.law import wrapped
+from towtank.pilot.orders import ORDERS
 from towtank.progress import Progress
 
 EPS, SEARCH = 1e-9, 12
 BY_EVENT, BY_TIME = 1.0, 2.0
 HEAD = 5
+THROTTLE = ORDERS.index("throttle")
 TO, SHARE = (0.5, 0.5, 1.0, 0.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
@@ -91,7 +93,7 @@ class _Lanes:
         self.x = [self._value(row) for row in start[:nx]]
         self.m = [self._value(row) for row in start[nx:]]
         self.y: list[Any] = [self._value(np.zeros(self.count))] * len(names)
-        self.granted, self.asked, self.rates = [0.0] * 3, [0.0] * form.fins, [0.0] * 3
+        self.granted, self.asked, self.rates = [0.0] * 3, [0.0] * (form.fins + 1), [0.0] * 3
         zero = self._value(np.zeros(self.count))
         self.t, self.end, self.live = zero, zero, zero + 1.0
         self.leg = np.zeros(self.count, dtype=int)
@@ -145,7 +147,7 @@ class _Lanes:
     def order(self, c: Any) -> None:
         """New command for the lanes in ``c``."""
         s = command(self.p, self.y, self.m, self.ref, self.tools.ops)
-        asked = product(self.p.constants.fins.mixing, s.granted)
+        asked = [*product(self.p.constants.fins.mixing, s.granted), self.ref[THROTTLE]]
         self.granted = [self.pick(c, a, b) for a, b in zip(s.granted, self.granted, strict=True)]
         self.asked = [self.pick(c, a, b) for a, b in zip(asked, self.asked, strict=True)]
         self.rates = [self.pick(c, a, b) for a, b in zip(s.memory_rates, self.rates, strict=True)]

@@ -183,7 +183,8 @@ def jacobian(
     if not all(np.isfinite(a).all() for a in (x, u, push, drift)):
         raise InputError("jacobian: a state, angle, thrust or current is not finite. Give finite numbers.")
     extra = np.zeros((count, form.fins - have))
-    x, u = np.ascontiguousarray(np.hstack([x, extra])), np.ascontiguousarray(np.hstack([u, extra]))
+    x = np.ascontiguousarray(np.hstack([x, extra]))
+    u = np.ascontiguousarray(np.hstack([u, extra, np.ones((count, 1))]))
     p = np.tile(parameters(form, model, NO_PILOT, 0.0), (count, 1))
     p[:, form.place["thrust"]] = push
     p[:, form.place["current_north"] : form.place["current_north"] + 3] = drift
@@ -334,7 +335,7 @@ def _dual_jacobians(form: Form, compiled: Library | None, p: Array, x: Array, u:
         moved = dynamics(s, v[:nx], v[nx : nx + nu], DUAL)
         slope = gradients(moved, len(v))
         # W M = 1, so that dW load = -W dM (W load).
-        held = np.array(inverse).reshape(6, 6) @ [part.value for part in load_through_water(s, v[:nx], DUAL)]
+        held = np.array(inverse).reshape(6, 6) @ [part.value for part in load_through_water(s, v[:nx], 1.0, DUAL)]
         mass = [
             [a - b for a, b in zip(*pair, strict=True)]
             for pair in zip(mass_matrix(s.constants.body), s.constants.added, strict=True)

@@ -28,7 +28,7 @@ class Traced:
     """The closed loop of a form as CasADi functions; sizes in ``numbers``.
 
     dynamics(p, x, asked) -> rates;   observe(p, x, orders) -> channels;   steer(p, channels, memory, orders) ->
-    granted (3), asked (n), rates of the memory (3), heading wanted (1).
+    granted (3), asked (n + 1: fin angles, throttle), rates of the memory (3), heading wanted (1).
     """
 
     form: Form
@@ -43,6 +43,7 @@ class Traced:
         names = channels(n)
         return {
             "NP": len(self.form.names), "NX": len(states(n)), "NM": len(MEMORY), "NO": len(ORDERS), "NF": n,
+            "NA": n + 1,
             "NS": observed(n), "NY": len(names), "PSI": names.index("psi"), "Z": names.index("z"),
             "DELTA": names.index("delta1"), "SPEED": names.index("speed"),
             "FIN_SHARE": self.form.place["fin_share"], "INVERSE": self.form.place["inverse00"],
@@ -54,7 +55,7 @@ def traced(form: Form) -> Traced:
     import casadi as ca
 
     n, ops = form.fins, casadi_ops()
-    sizes = {"p": len(form.names), "x": len(states(n)), "asked": n, "orders": len(ORDERS), "memory": len(MEMORY)}
+    sizes = {"p": len(form.names), "x": len(states(n)), "asked": n + 1, "orders": len(ORDERS), "memory": len(MEMORY)}
     v = SimpleNamespace(
         **{name: ca.SX.sym(name, size) for name, size in sizes.items()}, seen=ca.SX.sym("y", observed(n))
     )
@@ -65,9 +66,9 @@ def traced(form: Form) -> Traced:
     direct = ca.vertcat(*dynamics(weightless, listed["x"], listed["asked"], ops))
     seen = ca.vertcat(*observe(s, listed["x"], listed["orders"], ops))
     steering = command(s, listed["seen"], listed["memory"], listed["orders"], ops)
-    asked = product(s.constants.fins.mixing, steering.granted)
+    asked = [*product(s.constants.fins.mixing, steering.granted), listed["orders"][ORDERS.index("throttle")]]
     steered = [ca.vertcat(*part) for part in (steering.granted, asked, steering.memory_rates, [steering.heading])]
-    load = ca.vertcat(*load_through_water(s, listed["x"], ops))
+    load = ca.vertcat(*load_through_water(s, listed["x"], listed["asked"][-1], ops))
     e = SimpleNamespace(rates=rates, direct=direct, seen=seen, steered=steered, load=load, mass=_mass(s.constants))
     functions = {
         "dynamics": _function("dynamics", [v.p, v.x, v.asked], [rates]),

@@ -17,10 +17,14 @@ SCHEMA = "towtank/pilot/1"
 UNITS: Mapping[str, str] = {
     "speed": "m/s", "yaw_rate": "s", "heading": "1/s", "heading_integral": "1/s", "turn_limit": "rad/s",
     "pitch_rate": "s", "pitch": "", "pitch_order": "", "depth": "rad/m", "depth_rate": "rad s/m",
-    "depth_integral": "rad/(m s)", "pitch_limit": "rad", "roll": "", "roll_rate": "s", "unwind": "s",
+    "depth_integral": "rad/(m s)", "pitch_limit": "rad", "roll": "", "roll_rate": "s", "sway": "rad s/m",
+    "heave": "rad s/m", "scheduled": "", "unwind": "s",
     "heading_band": "rad", "depth_band": "m", "reversal": "m/s",
 }  # fmt: skip
 """Unit of each of ``GAINS``."""
+
+_LATER = ("sway", "heave", "scheduled")
+"""Gains that files of earlier versions lack; they take the default of ``Pilot``."""
 
 _MARGINS = ("largest_gain_factor", "smallest_gain_factor", "phase_margin")
 
@@ -74,12 +78,15 @@ def read_pilot(path: str | Path) -> Pilot:
 
 
 def _gains(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
-    gains = {name: float(entries[name]["value"]) for name in GAINS}
+    held = [name for name in GAINS if name in entries or name not in _LATER]
+    gains = {name: getattr(Pilot("", 1.0), name) for name in _LATER} | {
+        name: float(entries[name]["value"]) for name in held
+    }
     bad = [name for name, value in gains.items() if not math.isfinite(value)]
     bad += [name for name in ("speed", "unwind") if not gains[name] > 0.0]
     if bad:
         raise ValueError(f"{', '.join(bad)} cannot be used")
-    wrong = [name for name in GAINS if entries[name]["unit"] != UNITS[name]]
+    wrong = [name for name in held if entries[name]["unit"] != UNITS[name]]
     if wrong:
         raise ValueError(f"unit of {', '.join(wrong)}")
     return gains

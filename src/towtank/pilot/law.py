@@ -20,21 +20,24 @@ SLOWEST = 0.3
 MEMORY = 3
 """States of the pilot: trim of the rudder [rad], trim of the elevator [rad], integral of the guidance [m]."""
 _STANDSTILL = 1e-9
-"""Speed [m/s] that stands for zero where a speed is a divisor."""
+"""Speed [m/s] or gain [1/s] that stands for zero where one is a divisor."""
 
 
 @dataclass(frozen=True)
 class Pilot:
     """Gains designed for ``speed`` [m/s]. Commands are virtual angles [rad]; SNAME: +rudder turns to port.
 
-    rudder   = -schedule yaw_rate (r - r_ref) + trim,     r_ref     = heading (psi_ref - psi), at most turn_limit
-    elevator = -schedule (pitch_rate q + pitch theta - pitch_order theta_ref) + trim,
+    rudder   = -schedule (yaw_rate (r - r_ref) + sway v) + trim,   r_ref = heading (psi_ref - psi), at most turn_limit
+    elevator = -schedule (pitch_rate q + pitch theta - pitch_order theta_ref + heave w) + trim,
                                       theta_ref = depth_rate zdot - depth (z_ref - z), at most pitch_limit from trim
     aileron  = -schedule (roll phi + roll_rate p)
     The two trims integrate heading_integral (psi_ref - psi) and depth_integral (z_ref - z).
-    schedule = (speed / u)^2, because the fins' effect grows with u^2.
+    schedule = (speed / u)^2, because the fins' effect grows with u^2; 1 where ``scheduled`` is 0.
+    Under an order for a rate of turn, r_ref is that rate; the trim integrates heading_integral / heading (r_ref - r);
+    under one for a pitch, theta_ref is that pitch and the trim is held.
 
-    yaw_rate [s], heading [1/s], heading_integral [1/s], turn_limit [rad/s], pitch_rate [s], pitch [-], pitch_order [-],
+    yaw_rate [s], sway [rad s/m], heave [rad s/m], heading [1/s], heading_integral [1/s], turn_limit [rad/s],
+    pitch_rate [s], pitch [-], pitch_order [-],
     depth [rad/m], depth_rate [rad s/m], depth_integral [rad/(m s)], pitch_limit [rad], roll [-], roll_rate [s].
     unwind [s] : time in which a saturated fin takes back what its trim cannot use.
     heading_band [rad], depth_band [m] : largest errors the trims integrate, so that a large step does not fill them.
@@ -58,6 +61,9 @@ class Pilot:
     pitch_limit: float = 0.0
     roll: float = 0.0
     roll_rate: float = 0.0
+    sway: float = 0.0
+    heave: float = 0.0
+    scheduled: float = 1.0
     unwind: float = 1.0
     heading_band: float = 0.0
     depth_band: float = 0.0
@@ -79,7 +85,7 @@ NO_PILOT = Pilot(craft="", speed=1.0)
 class Seen(NamedTuple):
     """What a pilot measures.
 
-    x, y, z [m]; phi, theta, psi [rad]; u : speed ahead through the water [m/s]; p, q, r [rad/s]; sink : zdot [m/s].
+    x, y, z [m]; phi, theta, psi [rad]; u, v, w : speeds through the water [m/s]; p, q, r [rad/s]; sink : zdot [m/s].
     """
 
     x: Scalar
@@ -89,6 +95,8 @@ class Seen(NamedTuple):
     theta: Scalar
     psi: Scalar
     u: Scalar
+    v: Scalar
+    w: Scalar
     p: Scalar
     q: Scalar
     r: Scalar
@@ -127,8 +135,8 @@ def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memo
     off = wrapped(wanted - seen.psi, ops)
     deep = orders.depth - seen.z
     s = schedule(pilot, seen.u, ops)
-    rudder, turning = _rudder(pilot, s, off, seen, memory[0], ops)
-    elevator, pitching = _elevator(pilot, s, deep, seen, memory[1], ops)
+    rudder, turning = _rudder(pilot, s, off, orders, seen, memory[0], ops)
+    elevator, pitching = _elevator(pilot, s, deep, orders, seen, memory[1], ops)
     aileron = -s * (pilot.roll * ops.sin(seen.phi) + pilot.roll_rate * seen.p)
     asked = [
         _choose(steering, rudder, orders.rudder),
@@ -137,7 +145,8 @@ def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memo
     ]
     granted = share(asked, rows, limits, (1.0 - steering * (1.0 - diving), steering), ops)
     over = [want - got for want, got in zip(asked, granted, strict=True)]
-    to_heading = pilot.heading_integral * clamp(off, pilot.heading_band, ops)
+    lag = (orders.turn - seen.r) / ops.fmax(pilot.heading, _STANDSTILL)
+    to_heading = pilot.heading_integral * clamp(_choose(orders.turning, lag, off), pilot.heading_band, ops)
     to_depth = pilot.depth_integral * clamp(deep, pilot.depth_band, ops)
     rates = [
         _trim_rate(to_heading, steering * turning, memory[0], over[0], pilot.unwind, ops),
@@ -148,9 +157,9 @@ def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memo
 
 
 def schedule(pilot: Any, u: Scalar, ops: Ops) -> Scalar:
-    """(speed / u)^2 with u [m/s] not below ``SLOWEST`` times the design speed."""
+    """(speed / u)^2 with u [m/s] not below ``SLOWEST`` times the design speed; 1 for a pilot that is not scheduled."""
     ratio = pilot.speed / ops.fmax(u, SLOWEST * pilot.speed)
-    return ratio * ratio
+    return _choose(pilot.scheduled, ratio * ratio, 1.0)
 
 
 def authority(pilot: Any, u: Scalar, ops: Ops) -> Scalar:
@@ -178,22 +187,26 @@ def _choose(switch: Scalar, on: Scalar, off: Scalar) -> Scalar:
     return switch * on + (1.0 - switch) * off
 
 
-def _rudder(pilot: Any, s: Scalar, off: Scalar, seen: Any, trim: Scalar, ops: Ops) -> tuple[Scalar, Scalar]:
-    """Rudder asked for [rad] at a heading error ``off`` [rad]; 1 while the turn is within its limit, else 0."""
+def _rudder(
+    pilot: Any, s: Scalar, off: Scalar, orders: Any, seen: Any, trim: Scalar, ops: Ops
+) -> tuple[Scalar, Scalar]:
+    """Rudder asked for [rad] at a heading error ``off`` [rad]; 1 while the trim may integrate, else 0."""
     turn = pilot.heading * off
-    free = 1.0 - ops.positive(ops.fabs(turn) - pilot.turn_limit)
-    turn = clamp(turn, pilot.turn_limit, ops)
-    return -s * pilot.yaw_rate * (seen.r - turn) + trim, free
+    free = 1.0 - ops.positive(ops.fabs(turn) - pilot.turn_limit) * (1.0 - orders.turning)
+    turn = _choose(orders.turning, orders.turn, clamp(turn, pilot.turn_limit, ops))
+    return -s * (pilot.yaw_rate * (seen.r - turn) + pilot.sway * seen.v) + trim, free
 
 
-def _elevator(pilot: Any, s: Scalar, deep: Scalar, seen: Any, trim: Scalar, ops: Ops) -> tuple[Scalar, Scalar]:
-    """Elevator asked for [rad] at a depth error ``deep`` [m]; 1 while the pitch is within its limit, else 0."""
+def _elevator(
+    pilot: Any, s: Scalar, deep: Scalar, orders: Any, seen: Any, trim: Scalar, ops: Ops
+) -> tuple[Scalar, Scalar]:
+    """Elevator asked for [rad] at a depth error ``deep`` [m]; 1 while the trim may integrate, else 0."""
     followed = authority(pilot, seen.u, ops)
     pitch = followed * (pilot.depth_rate * seen.sink - pilot.depth * deep)
     free = (1.0 - ops.positive(ops.fabs(pitch) - pilot.pitch_limit)) * (1.0 - ops.positive(1.0 - followed))
-    pitch = clamp(pitch, pilot.pitch_limit, ops)
-    asked = pilot.pitch_rate * seen.q + pilot.pitch * seen.theta - pilot.pitch_order * pitch
-    return -s * asked + trim, free
+    pitch = _choose(orders.pitching, orders.pitch, clamp(pitch, pilot.pitch_limit, ops))
+    asked = pilot.pitch_rate * seen.q + pilot.pitch * seen.theta - pilot.pitch_order * pitch + pilot.heave * seen.w
+    return -s * asked + trim, free * (1.0 - orders.pitching)
 
 
 def _trim_rate(wanted: Scalar, free: Scalar, trim: Scalar, over: Scalar, unwind: Scalar, ops: Ops) -> Scalar:

@@ -16,6 +16,9 @@ class Orders:
     north, east [m] : start of the leg.   course [rad].   lookahead [m] : distance ahead at which the craft aims, > 0.
     drift [1/s] : gain of the guidance integral.   crab [rad] : angle between course and heading in a known current.
     dive : 1 when a depth is followed.   depth [m].   damp_roll : 1 when the pilot damps roll.
+    turning : 1 when a rate of turn is followed instead of a heading; ``steer`` must be set.   turn [rad/s].
+    pitching : 1 when a pitch is followed instead of a depth; ``dive`` must be set.   pitch [rad].
+    throttle : thrust as a multiple of the run's own; 0 when the propeller stops, below 0 astern.
     """
 
     piloted: float = 0.0
@@ -33,6 +36,11 @@ class Orders:
     dive: float = 0.0
     depth: float = 0.0
     damp_roll: float = 1.0
+    turning: float = 0.0
+    turn: float = 0.0
+    pitching: float = 0.0
+    pitch: float = 0.0
+    throttle: float = 1.0
 
 
 ORDERS: tuple[str, ...] = tuple(field.name for field in fields(Orders))

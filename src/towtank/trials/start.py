@@ -142,7 +142,8 @@ def setting(model: Model, speed: Quantity | None, pilot: Pilot | None = None, *,
     pilot = (pilot or design_pilot(model, U)) if piloted else None
     fins = model.craft.mixing[:, 1] * trim.elevator if model.craft.fins else np.zeros(0)
     # The elevator's trim carries what the pitch feedback asks for in level flight: the pilot starts at rest.
-    carried = trim.elevator + float(schedule(pilot, trim.u, MATH)) * pilot.pitch * trim.pitch if pilot else 0.0
+    asked = float(schedule(pilot, trim.u, MATH)) * (pilot.pitch * trim.pitch + pilot.heave * trim.w) if pilot else 0.0
+    carried = trim.elevator + asked if pilot else 0.0
     state = [0.0, 0.0, 0.0, 0.0, trim.pitch, 0.0, trim.u, 0.0, trim.w, 0.0, 0.0, 0.0, *fins]
     return Setting(U, trim, np.array(state), (0.0, carried, 0.0), pilot, float(model.thrust(U)), model.craft.length / U)
 

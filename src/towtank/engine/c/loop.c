@@ -1,5 +1,5 @@
 /* Trajectories in packs: observe, steer, integrate; legs, events, gauges and the log.
-   model.h gives NP NX NM NO NY NS NF PSI DELTA SPEED and dynamics, observe, steer. */
+   model.h gives NP NX NM NO NY NS NF NA PSI DELTA SPEED and dynamics, observe, steer. */
 #include <stddef.h>
 #include "task.h"
 #include "lanes.h"
@@ -12,7 +12,7 @@ enum { HEAD = LEG_HEAD, MOST = 32, SEARCH = 12 };
 /* One lane set of trajectories. */
 typedef struct {
   T p[NP], x[NX], m[NM], y[NY], ref[NO];
-  T granted[3], asked[NF], rates[NM];
+  T granted[3], asked[NA], rates[NM];
   T t, end, live;                       /* time, end of the leg, 1.0 while running */
   T channel, absolute, level, side;     /* event of the leg, and the side of it the leg began on; 0.0 on the level itself */
   T fastest;
@@ -54,10 +54,10 @@ INLINE void keep(const Pack *k, T *y) {
 
 /* New orders and command for the lanes in c. */
 static __attribute__((noinline)) void order(Pack *k, T c) {
-  T granted[3], asked[NF], rates[NM], heading[1];
+  T granted[3], asked[NA], rates[NM], heading[1];
   steer(k->p, k->y, k->m, k->ref, granted, asked, rates, heading);
   for (int i = 0; i < 3; i++) k->granted[i] = PICK(c, granted[i], k->granted[i]);
-  for (int i = 0; i < NF; i++) k->asked[i] = PICK(c, asked[i], k->asked[i]);
+  for (int i = 0; i < NA; i++) k->asked[i] = PICK(c, asked[i], k->asked[i]);
   for (int i = 0; i < NM; i++) k->rates[i] = PICK(c, rates[i], k->rates[i]);
   k->y[NS + 3] = PICK(c, heading[0], k->y[NS + 3]);
   T y[NY];

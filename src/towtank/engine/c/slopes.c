@@ -52,16 +52,16 @@ INLINE void step(const double *p, const double *x, const double *asked, double d
   }
 }
 
-/* Forward: the four points of every step and the last state (4 * ticks * steps + 1, NX), memories (ticks + 1, NM), commands (ticks, NF). */
+/* Forward: the four points of every step and the last state (4 * ticks * steps + 1, NX), memories (ticks + 1, NM), commands (ticks, NA). */
 static void forward(const Slope *a, double *X, double *M, double *U) {
   double dt = a->tick / (double)a->steps, rates[NM], y[NY];
   memcpy(X, a->start, NX * sizeof(double));
   memcpy(M, a->start + NX, NM * sizeof(double));
   for (int64_t k = 0; k < a->ticks; k++) {
     const double *ref = a->orders + a->row[k] * NO;
-    guide(a->p, X, M + k * NM, ref, U + k * NF, rates);
+    guide(a->p, X, M + k * NM, ref, U + k * NA, rates);
     for (int i = 0; i < NM; i++) M[(k + 1) * NM + i] = M[k * NM + i] + a->tick * rates[i];
-    for (int64_t s = 0; s < a->steps; s++, X += 4 * NX) step(a->p, X, U + k * NF, dt, (double(*)[NX])X, X + 4 * NX);
+    for (int64_t s = 0; s < a->steps; s++, X += 4 * NX) step(a->p, X, U + k * NA, dt, (double(*)[NX])X, X + 4 * NX);
     observe(a->p, X, ref, y);
     for (int64_t c = 0; c < a->channels; c++) a->seen[k * a->channels + c] = y[a->channel[c]];
   }
@@ -78,14 +78,14 @@ static void look_back(const double *p, const double *x, const double *ref, const
 /* Misfit and its gradient by the discrete adjoint of the loop. Returns 0, or 1 without memory. */
 __attribute__((visibility("default"))) int misfit(const Slope *a) {
   int64_t n = a->ticks * a->steps;
-  double *X = malloc(((4 * n + 1) * NX + (a->ticks + 1) * NM + a->ticks * NF) * sizeof(double));
+  double *X = malloc(((4 * n + 1) * NX + (a->ticks + 1) * NM + a->ticks * NA) * sizeof(double));
   if (!X) return 1;
   double *M = X + (4 * n + 1) * NX, *U = M + (a->ticks + 1) * NM, dt = a->tick / (double)a->steps, total = 0.0;
   double lx[NX] = {0}, lm[NM] = {0}, theta[FREE] = {0};
   forward(a, X, M, U);
   for (int64_t k = a->ticks - 1; k >= 0; k--) {
     const double *ref = a->orders + a->row[k] * NO;
-    double ly[NS] = {0}, la[NF] = {0}, ab[NF], mb[NM], tb[FREE], back[NM];
+    double ly[NS] = {0}, la[NA] = {0}, ab[NA], mb[NM], tb[FREE], back[NM];
     for (int64_t c = 0; c < a->channels; c++) {
       double e = a->seen[k * a->channels + c] - a->measured[k * a->channels + c], w = a->weight[k * a->channels + c];
       if (a->channel[c] == PSI) e = wrapped(e);
@@ -102,8 +102,8 @@ __attribute__((visibility("default"))) int misfit(const Slope *a) {
       for (int g = 3; g >= 0; g--) {
         double share = SHARE[g] * dt, on = g < 3 ? TO[g + 1] * dt : 0.0;
         for (int i = 0; i < NX; i++) l[i] = share * lx[i] + on * yb[i];
-        dynamics_vjp(a->p, at + g * NX, U + k * NF, l, yb, ab, tb);
-        for (int i = 0; i < NF; i++) la[i] += ab[i];
+        dynamics_vjp(a->p, at + g * NX, U + k * NA, l, yb, ab, tb);
+        for (int i = 0; i < NA; i++) la[i] += ab[i];
         for (int i = 0; i < FREE; i++) theta[i] += tb[i];
         for (int i = 0; i < NX; i++) sum[i] += yb[i];
       }
@@ -171,7 +171,7 @@ INLINE void rates_tangent(const double *W, const Local *j, const Drive *drive, c
   for (int i = 0; i < NX; i++) rate[i] = drive->rate[i];
   for (int i = 0; i < 6; i++) load[i] = drive->load[i];
   TIMES(dynamics_jac0, NX, j->dx, x, rate);
-  TIMES(dynamics_jac1, NF, j->da, asked, rate);
+  TIMES(dynamics_jac1, NA, j->da, asked, rate);
   TIMES(dynamics_jac3, NX, j->lx, x, load);
   for (int i = 0; i < 6; i++)
     for (int k = 0; k < 6; k++) rate[7 + i] += ALL(W[6 * i + k]) * load[k];
@@ -191,7 +191,7 @@ static __attribute__((noinline)) void step_tangent(const double *W, const Local 
 }
 
 /* A pack of directions: tangents of state, memory and command. */
-typedef struct { V x[NX], m[NM], asked[NF]; } Directions;
+typedef struct { V x[NX], m[NM], asked[NA]; } Directions;
 
 /* Tangents of the observed channels (NS) in a pack. */
 INLINE void seen_tangent(const double *yx, const double *yt, const int64_t *direction, int lanes, const V *x, V *out) {
@@ -210,14 +210,14 @@ static void guide_tangent(const Slope *a, const double *x, const double *m, cons
   for (int64_t q = 0; q < packs; q++) {
     int lanes = (int)(a->directions - q * WIDE < WIDE ? a->directions - q * WIDE : WIDE);
     const int64_t *direction = a->direction + q * WIDE;
-    V seen[NS], out[NF + NM];
-    for (int i = 0; i < NF + NM; i++) out[i] = ALL(0.0);
+    V seen[NS], out[NA + NM];
+    for (int i = 0; i < NA + NM; i++) out[i] = ALL(0.0);
     seen_tangent(yx, yt, direction, lanes, D[q].x, seen);
     for (int l = 0; l < lanes; l++) column(steer_jac2_col, steer_jac2_row, gt, direction[l], l, out);
     TIMES(steer_jac0, NS, gy, seen, out);
     TIMES(steer_jac1, NM, gm, D[q].m, out);
-    for (int i = 0; i < NF; i++) D[q].asked[i] = out[i];
-    for (int i = 0; i < NM; i++) D[q].m[i] += ALL(a->tick) * out[NF + i];
+    for (int i = 0; i < NA; i++) D[q].asked[i] = out[i];
+    for (int i = 0; i < NM; i++) D[q].m[i] += ALL(a->tick) * out[NA + i];
   }
 }
 
@@ -240,7 +240,7 @@ static void tangents_out(const Slope *a, int64_t k, const double *x, const doubl
 /* Tangents of the observed channels along the trajectory in the chosen directions. Returns 0, or 1 without memory. */
 __attribute__((visibility("default"))) int tangents(const Slope *a) {
   int64_t packs = (a->directions + WIDE - 1) / WIDE;
-  double dt = a->tick / (double)a->steps, x[NX], m[NM], asked[NF], rates[NM];
+  double dt = a->tick / (double)a->steps, x[NX], m[NM], asked[NA], rates[NM];
   size_t size = packs * (sizeof(Directions) + 4 * sizeof(Drive)) + 64;
   Directions *D = aligned_alloc(64, (size + 63) / 64 * 64);
   Local local[4];
@@ -278,11 +278,11 @@ __attribute__((visibility("default"))) int tangents(const Slope *a) {
   return 0;
 }
 
-/* Rates and their Jacobians at `count` points: A (count, NX, NX), B (count, NX, NF), G (count, NX, FREE); zero before.
+/* Rates and their Jacobians at `count` points: A (count, NX, NX), B (count, NX, NA), G (count, NX, FREE); zero before.
    p_stride : NP, or 0 when the points share their parameters. */
 __attribute__((visibility("default"))) void jacobians(int64_t count, const double *p, int64_t p_stride, const double *x,
                                                       const double *asked, double *rates, double *A, double *B, double *G) {
-  for (int64_t n = 0; n < count; n++, p += p_stride, x += NX, asked += NF, rates += NX, A += NX * NX, B += NX * NF, G += NX * FREE) {
+  for (int64_t n = 0; n < count; n++, p += p_stride, x += NX, asked += NA, rates += NX, A += NX * NX, B += NX * NA, G += NX * FREE) {
     Local j;
     const double *W = p + INVERSE;
     dynamics(p, x, asked, rates);
@@ -293,7 +293,7 @@ __attribute__((visibility("default"))) void jacobians(int64_t count, const doubl
     for (int c = 0; c < columns; c++) for (int i = name##_col[c]; i < name##_col[c + 1]; i++) \
       for (int r = 0; r < 6; r++) out[(7 + r) * columns + c] += W[6 * r + name##_row[i]] * J[i];
     SCATTER(dynamics_jac0, NX, j.dx, A)
-    SCATTER(dynamics_jac1, NF, j.da, B)
+    SCATTER(dynamics_jac1, NA, j.da, B)
     SCATTER(dynamics_jac2, FREE, j.dt, G)
     THROUGH(dynamics_jac3, NX, j.lx, A)
     THROUGH(dynamics_jac4, FREE, j.lt, G)
