@@ -137,6 +137,7 @@ def _moved(d: Derivatives, shift: float) -> Derivatives:
         d, reference=reference, names=names, values=values, runs=runs, origin=origin, origin_std=std, quality=quality,
         covariance_fit=matrix @ d.covariance_fit @ matrix.T, covariance_mesh=matrix @ d.covariance_mesh @ matrix.T,
         covariance_model=matrix @ d.covariance_model @ matrix.T,
+        fin_curve=None if d.fin_curve is None else d.fin_curve.about(d.reference.origin_from_nose, shift),
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from towtank.artefact import read_json, write_json
+from towtank.derive.fin_curve import fin_curve_document, fin_curve_of
 from towtank.derive.table import Derivatives, Reference
 from towtank.errors import ArtefactError
 from towtank.symbols import TERMS
@@ -58,6 +59,7 @@ def document(d: Derivatives) -> dict[str, Any]:
             name: {"value": value, "std": d.origin_std.get(name, 0.0), "prime": value / prime_factor(d, name)}
             for name, value in d.origin.items()
         },
+        "fin_curve": fin_curve_document(d.fin_curve),
         "rejected": [{"run": run, "why": why} for run, why in d.rejected],
         "quality": dict(d.quality),
         "provenance": dict(d.provenance),
@@ -116,4 +118,5 @@ def _derivatives(content: dict[str, Any]) -> Derivatives:
         origin_std={name: float(item["std"]) for name, item in content["origin"].items()},
         quality=content["quality"],
         provenance=content["provenance"],
+        fin_curve=fin_curve_of(content.get("fin_curve")),
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from towtank.derive.fin_curve import FinCurve
 from towtank.frames import Array
 
 
@@ -30,6 +31,7 @@ class Derivatives:
         indices; the main values are the wide-range fit used by the model.   origin_std : their standard uncertainty.
     quality : numbers about the fit: condition number, lambda, gaps between symmetric halves, range of the fit, fins'
         linear range, residual per run, classical Fourier results; plain JSON content.
+    fin_curve : fin loads beyond the linear range and the straightening factors; None where no run went beyond it.
     """
 
     craft: str
@@ -47,6 +49,7 @@ class Derivatives:
     origin_std: Mapping[str, float] = field(default_factory=dict)
     quality: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    fin_curve: FinCurve | None = None
 
     @property
     def covariance(self) -> Array:
