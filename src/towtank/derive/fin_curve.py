@@ -59,7 +59,7 @@ class FinCurve:
         Raises
         ------
         InputError
-            A number that is not finite, or outside the range in which the load grows up to the stall and keeps its sign.
+            A number that is not finite, or with which the load would fall before the stall or change its sign.
         """
         numbers = (self.stall, self.curvature, self.drop, self.width, self.kappa_v, self.kappa_r)
         if not all(math.isfinite(number) for number in numbers):
