@@ -10,7 +10,8 @@ import numpy as np
 
 from towtank.craft.craft import Craft, Fin, Mass
 from towtank.derive.table import Derivatives, Reference
-from towtank.model.equations import Model, ModelOptions
+from towtank.model.equations import Model
+from towtank.model.options import ModelOptions
 
 SUBOFF = {
     "Xudot": -0.0004, "Yvdot": -0.014711, "Nvdot": 0.000415, "Yrdot": 0.000415, "Nrdot": -0.000744, "Kpdot": -2e-6,

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from towtank.craft.craft import Craft, Fin, Mass, Propeller
 from towtank.craft.hull import Ellipsoid
-from towtank.model.equations import Model, ModelOptions
+from towtank.model.equations import Model
+from towtank.model.options import ModelOptions
 from towtank.symbols import FOURFOLD_TIES, LOADS, RATES
 
 FEW = settings(max_examples=20, deadline=None)

@@ -13,16 +13,18 @@ from model_cases import AT_ORIGIN, FEW, FOURFOLD, ROLLING, angles, attitudes, cr
 from scipy.integrate import solve_ivp
 
 from towtank.craft.craft import Propeller
+from towtank.engine.form import BEND, BY_FIN, INFLOW
 from towtank.errors import InputError
 from towtank.frames import rotation
 from towtank.model.algebra import MATH, NUMPY, Table, interpolate, table_of
 from towtank.model.dual import DUAL, Dual
-from towtank.model.equations import Constants, Model, ModelOptions, acceleration, right_hand_side_quaternion, total_load
+from towtank.model.equations import Constants, Model, acceleration, right_hand_side_quaternion, total_load
 from towtank.model.extra import ExtraLoad
 from towtank.model.files import write_model
-from towtank.model.fins import FinSet
+from towtank.model.fins import Bend, FinSet
 from towtank.model.kinematics import attitude_of, quaternion_matrix, quaternion_of, quaternion_rates
 from towtank.model.linear import INPUTS, linearise, linearise_at
+from towtank.model.options import ModelOptions
 from towtank.model.rigid_body import Body
 from towtank.model.thrust import Screw
 from towtank.symbols import TERMS
@@ -204,11 +206,13 @@ def _constants(p, split, axisymmetric):
     c = SimpleNamespace(**{name: p() for name in TERMS})
     matrices = [[[p() for _ in range(6)] for _ in range(6)] for _ in range(2)]
     rows = [[p() for _ in range(width)] for width in (3, 3, 3, 3, 4, 4, 4, 2, 2, 2, 2)]
-    fins = FinSet(rows[:4], rows[4:7], rows[7:], *(tuple(p() for _ in range(4)) for _ in range(4)))
+    by_fin = {word: tuple(p() for _ in range(4)) for word in BY_FIN}
+    bend, inflow = Bend(*(p() for _ in BEND)), {word: p() for word in INFLOW}
+    fins = FinSet(rows[:4], rows[4:7], rows[7:], **by_fin, bend=bend, **inflow)
     knots = (-1.0, p(), 2.0)
     tables = {name: Table(knots, p(), (p(), p())) for name in ("kt", "kq")}
     screw = Screw(**{name: p() for name in _SCREW_NAMES}, **tables)
-    options = ModelOptions(p(), p(), axisymmetric)
+    options = ModelOptions(axisymmetric_crossflow=axisymmetric)
     extra = VORTEX.with_values({name: p() for name in VORTEX.values})
     return Constants(body, c, *matrices, fins, screw, split, options, extra), p(), [p(), p(), p()]
 

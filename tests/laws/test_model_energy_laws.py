@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from towtank.frames import rotation
 from towtank.model.added_mass import added_mass_matrix, coriolis_full, coriolis_reduced
-from towtank.model.equations import ModelOptions
+from towtank.model.options import ModelOptions
 from towtank.model.rigid_body import Body, coriolis_matrix, mass_matrix
 
 ROUND_OFF = 1e-12  # relative to the largest product in the sum

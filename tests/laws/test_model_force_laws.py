@@ -12,9 +12,10 @@ from scipy.integrate import solve_ivp
 from towtank.craft.craft import Propeller
 from towtank.errors import ArtefactError, CraftError, InputError
 from towtank.model.algebra import MATH, interpolate
-from towtank.model.equations import Model, ModelOptions
+from towtank.model.equations import Model
 from towtank.model.files import read_model, write_model
 from towtank.model.linear import elevator_reversal_speed, horizontal, linearise, stability_indices, vertical
+from towtank.model.options import ModelOptions
 from towtank.model.thrust import shaft_speed
 from towtank.model.values import to_variant
 from towtank.symbols import TERMS
@@ -140,7 +141,8 @@ def test_fins_follow_their_order_with_lag_rate_limit_and_angle_limit():
 def test_straightening_takes_the_local_flow_angle_off_the_fin():
     plain, turning = model(), [1.5, 0.0, 0.0, 0.0, 0.0, 0.1]
     station = plain.constants.fins.station[0]
-    both = model(options=ModelOptions(kappa_v=0.4, kappa_r=0.8, centre_of_buoyancy=(0.0, 0.0, 0.0)))
+    options = ModelOptions(kappa_v=0.4, kappa_r=0.8, fins_apart=1.0, centre_of_buoyancy=(0.0, 0.0, 0.0))
+    both = model(options=options)
     for nu, angle in (([1.5, 0.1, 0, 0, 0, 0], 0.4 * np.arctan(0.1 / 1.5)), (turning, 0.8 * station * 0.1 / 1.5)):
         change = np.array(both.captive_load(nu, REST, [0.0] * 4)) - plain.captive_load(nu, REST, [0.0] * 4)
         # the X fins see the flow at 45 deg; the virtual rudder collects it again. atan is not linear: 0.1 %

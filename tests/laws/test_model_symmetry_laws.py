@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 
 from towtank.errors import InputError
 from towtank.frames import rotation
-from towtank.model.equations import Model, ModelOptions
+from towtank.model.equations import Model
+from towtank.model.options import ModelOptions
 from towtank.model.rigid_body import coriolis_matrix, mass_matrix
 from towtank.model.values import lumped_to_split, split_to_lumped, to_variant
 

@@ -227,7 +227,7 @@ def gained():
 
 def flown(pilot, orders, seen, memory, ops, fins=FINS):
     """The law's seven numbers."""
-    out = steer(pilot, fins.rows, fins.limits, orders, seen, memory, ops)
+    out = steer(pilot, fins, orders, seen, memory, ops)
     return [*out.granted, *out.memory_rates, out.heading]
 
 

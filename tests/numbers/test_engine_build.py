@@ -26,6 +26,7 @@ from towtank.engine.run import Ensemble, fly
 from towtank.engine.start import at
 from towtank.errors import InputError, TowtankError
 from towtank.model.extra import ExtraLoad
+from towtank.model.faults import Lost
 from towtank.pilot.design import design_pilot
 from towtank.pilot.orders import Orders
 
@@ -250,7 +251,9 @@ def six_fins(craft):
 
 FORMS = {
     "six fins, axisymmetric": six_fins,
-    "straightened": lambda m: replace(m, options=replace(m.options, kappa_v=0.5, kappa_r=0.3)),
+    "axisymmetric, a fin lost": lambda m: m.with_options(
+        axisymmetric_crossflow=True, faults=(Lost(m.craft.fins[0].name),), kappa_v=0.5, kappa_r=0.3
+    ),
 }
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 import synthetic_craft as synthetic
 from towtank.craft.craft import Propeller
+from towtank.derive.fin_curve import FinCurve
 from towtank.engine.plan import Clock, Gauge, Leg, Until
 from towtank.engine.start import at
 from towtank.model.equations import Model
@@ -25,6 +26,8 @@ CROSS = {"Kuv": 3.0, "Kvv": -2.0, "Kur": 1.5, "Krr": -4.0, "Kpp": -200.0, "Kvdot
 OPTIONAL = {"Xuuvv": 40.0, "Yvvv": -300.0, "Yvvr": 200.0, "Yvrr": -150.0, "Yrrr": 90.0, "Nvvv": 120.0, "Nvrr": -400.0,
             "Nrrr": -900.0, "Zwww": -300.0, "Zwqq": -150.0, "Mwwq": -210.0, "Mqqq": -900.0}  # fmt: skip
 """Some terms that a fit takes up only when asked, SI."""
+CURVE = FinCurve(0.6, 0.0, 0.3, 0.2, "invented", kappa_v=0.4, kappa_r=0.8, station_from_nose=5.0)
+"""A fin that stalls beyond the runs' angles; the derivatives hold half of its load in drift and turning."""
 CASES = ("lumped", "split", "screw", "three fins", "optional")
 
 
@@ -46,6 +49,7 @@ def model(name):
     d = plain.derivatives
     values = {name: d[name] for name in d.names} | CROSS | (OPTIONAL if name == "optional" else {})
     made = Model.from_values(craft, values, options=plain.options)
+    made = replace(made, derivatives=replace(made.derivatives, fin_curve=CURVE)).with_options(fins_apart=0.5)
     return replace(made, derivatives=to_variant(made.derivatives, "split")) if name == "split" else made
 
 

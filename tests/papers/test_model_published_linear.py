@@ -10,8 +10,9 @@ import yaml
 
 from towtank.craft.craft import Craft, Fin, Mass
 from towtank.craft.hull import Ellipsoid
-from towtank.model.equations import Model, ModelOptions
+from towtank.model.equations import Model
 from towtank.model.linear import stability_indices, vertical
+from towtank.model.options import ModelOptions
 from towtank.water import GRAVITY, Water
 
 DATA = Path(__file__).parents[1] / "data"

@@ -33,6 +33,10 @@ class Profile(Protocol):
         """Profiles are frozen data: integrals over them are kept by value."""
 
 
+ACTUATOR = ("max_angle", "max_rate", "time_constant", "dead_band", "backlash")
+"""Fields of a fin that are its actuator's: the water does not feel them."""
+
+
 @dataclass(frozen=True)
 class Fin:
     """One all-moving fin with a trapezoidal planform.
@@ -60,6 +64,10 @@ class Fin:
     max_angle: float = np.radians(25.0)
     max_rate: float = np.radians(30.0)
     time_constant: float = 0.2
+    dead_band: float = 0.0
+    """Smallest change of the angle asked for that the actuator answers [rad]."""
+    backlash: float = 0.0
+    """Half the play between actuator and fin [rad]."""
     sign: float = 1.0
 
     @property

@@ -62,7 +62,7 @@ def _placed(fins: Any, faults: list[str]) -> list[tuple[str, float, float]]:
 
 
 _OPTIONAL = ("section", "trailing_edge_sweep", "hinge", "max_angle", "max_rate", "time_constant")
-_SHAPE = ("root_radius", "root_chord", "tip_radius", "tip_chord", "trailing_edge", *_OPTIONAL)
+_SHAPE = ("root_radius", "root_chord", "tip_radius", "tip_chord", "trailing_edge", *_OPTIONAL, "dead_band", "backlash")
 
 
 def _shape(path: str, section: Any, sections: Sections) -> dict[str, Any]:

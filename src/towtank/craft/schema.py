@@ -31,6 +31,7 @@ _LIMITS: dict[str, tuple[Callable[[float], bool], str]] = {
     "not negative": (lambda x: x >= 0.0, "is negative"),
     "fraction": (lambda x: 0.0 <= x <= 1.0, "is not between 0 and 1"),
     "acute": (lambda x: 0.0 < x < 1.5707, "is not between 0 and 90 deg"),
+    "small": (lambda x: 0.0 <= x < 0.35, "is not between 0 and 20 deg"),
     "sharp": (lambda x: abs(x) < 1.5, "is not between -85 and 85 deg"),
 }
 
@@ -70,6 +71,7 @@ TailAngle = Annotated[Given, _number("rad", "acute")]
 SweepAngle = Annotated[Given, _number("rad", "sharp")]
 FinAngle = Annotated[Given, _number("rad", "acute")]
 FinRate = Annotated[Given, _number("rad/s", "positive")]
+PlayAngle = Annotated[Given, _number("rad", "small")]
 Time = Annotated[Given, _number("s", "not negative")]
 PositiveNumber = Annotated[Given, _number("", "positive")]
 PlainNumber = Annotated[Given, _number("")]
@@ -203,6 +205,8 @@ class FinShape(Section):
     max_angle: FinAngle | None = Field(None, description="largest deflection either way")
     max_rate: FinRate | None = Field(None, description="fastest deflection rate")
     time_constant: Time | None = Field(None, description="first-order lag of the actuator")
+    dead_band: PlayAngle | None = Field(None, description="smallest change of angle the actuator answers; none without")
+    backlash: PlayAngle | None = Field(None, description="half the play between actuator and fin; none without")
 
 
 class FinsSection(FinShape):

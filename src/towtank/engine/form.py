@@ -8,11 +8,13 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
-from towtank.model.equations import Constants, Model, ModelOptions
+from towtank.model.equations import Constants, Model
 from towtank.model.extra import ExtraLoad
-from towtank.model.fins import FinSet
+from towtank.model.fins import Bend, FinSet
+from towtank.model.options import ModelOptions
 from towtank.model.rigid_body import Body
 from towtank.model.thrust import Screw
+from towtank.pilot.allocation import Allocation, Damage
 from towtank.pilot.law import GAINS
 from towtank.symbols import LOADS, OPTIONAL, RATES, STANDING, TERMS
 
@@ -25,6 +27,13 @@ BODY = tuple(field.name for field in fields(Body))
 ADDED = tuple(f"{load}{rate}dot" for load in LOADS for rate in RATES)
 OPTIONALS = tuple(name for group in OPTIONAL.values() for name in group)
 DAMPING = tuple(name for name in STANDING if not TERMS[name].is_added_mass)
+BY_FIN = (
+    "station", "max_angle", "max_rate", "time_constant", "dead_band", "backlash", "effect", "stuck", "stuck_angle",
+)  # fmt: skip
+"""Numbers of each fin."""
+PLAY = ("dead_band", "backlash")
+BEND = tuple(field.name for field in fields(Bend))
+INFLOW = ("kappa_v", "kappa_r", "apart")
 _SCREW = ("density", "diameter", "wake", "deduction", "torque", "force_per_square")
 
 
@@ -32,7 +41,8 @@ _SCREW = ("density", "diameter", "wake", "deduction", "torque", "force_per_squar
 class Form:
     """What decides the text of the equations; everything else is a parameter.
 
-    fins : number of fins.   split : variant of the derivatives.   axisymmetric, straightened : options of the model.
+    fins : number of fins.   split : variant of the derivatives.   axisymmetric : option of the model.
+    damaged : the pilot knows of faults of the fins and shares its command among those that are left.
     optional : terms of ``symbols.OPTIONAL`` take part.
     rows : knots of the propeller's table, 0 for constant thrust.   extra : a user's own load.
     """
@@ -40,7 +50,7 @@ class Form:
     fins: int = SHIPPED_FINS
     split: bool = False
     axisymmetric: bool = False
-    straightened: bool = False
+    damaged: bool = False
     rows: int = 0
     extra: ExtraLoad | None = None
     optional: bool = False
@@ -56,7 +66,8 @@ class Form:
         return (
             self.fins == SHIPPED_FINS
             and self.rows in (0, SHIPPED_ROWS)
-            and not (self.axisymmetric or self.straightened or self.extra or (self.optional and self.split))
+            and not (self.axisymmetric or self.extra or self.damaged)
+            and not (self.optional and self.split)
         )
 
     @property
@@ -67,7 +78,7 @@ class Form:
             f"{self.fins}fins",
             f"screw{self.rows}" if self.rows else "",
             "axisymmetric" if self.axisymmetric else "",
-            "straightened" if self.straightened else "",
+            "damaged" if self.damaged else "",
             "optional" if self.optional else "",
             self.extra.name if self.extra else "",
         ]
@@ -79,9 +90,8 @@ class Form:
         n = range(self.fins)
         out = [*BODY, *self.damping, *ADDED, "thrust", "current_north", "current_east", "current_down"]
         out += [f"mixing{i}{j}" for i in n for j in range(3)] + [f"unmixing{j}{i}" for j in range(3) for i in n]
-        out += [f"{word}{i}" for word in ("max_angle", "max_rate", "time_constant") for i in n] + ["fin_share"]
-        if self.straightened:
-            out += ["kappa_v", "kappa_r", *(f"lift{i}{j}" for i in n for j in range(2)), *(f"station{i}" for i in n)]
+        out += [f"{word}{i}" for word in BY_FIN for i in n] + ["fin_share"]
+        out += [*(f"lift{i}{j}" for i in n for j in range(2)), *(f"fin_{word}" for word in BEND), *INFLOW]
         if self.rows:
             out += [f"screw_{name}" for name in _SCREW] + [f"screw_knot{i}" for i in range(self.rows)]
             out += [f"screw_{c}{i}" for c in ("kt", "kq") for i in range(self.rows)]
@@ -111,7 +121,7 @@ def form_of(model: Model) -> Form:
         fins=max(fins, SHIPPED_FINS),
         split=k.split,
         axisymmetric=k.options.axisymmetric_crossflow,
-        straightened=bool(k.options.kappa_v or k.options.kappa_r),
+        damaged=bool(k.options.faults and k.options.faults_known),
         rows=max(rows, SHIPPED_ROWS) if rows else 0,
         extra=k.extra,
         optional=k.optional,
@@ -127,6 +137,16 @@ class System:
     thrust: Any
     current: Sequence[Any]
     fin_share: Any
+    damaged: bool = False
+
+    @property
+    def tail(self) -> Allocation:
+        """The fins as the pilot knows them."""
+        fins = self.constants.fins
+        if not self.damaged:
+            return Allocation(fins.mixing, fins.max_angle)
+        columns = [[e * share for e, share in zip(row, fins.effect, strict=True)] for row in fins.unmixing]
+        return Allocation(fins.mixing, fins.max_angle, Damage(columns, fins.stuck, fins.stuck_angle))
 
 
 def system(form: Form, p: Sequence[Any]) -> System:
@@ -142,11 +162,10 @@ def system(form: Form, p: Sequence[Any]) -> System:
     fins = FinSet(
         mixing=[list(row(f"mixing{i}", 3)) for i in n],
         unmixing=[list(row(f"unmixing{j}", form.fins)) for j in range(3)],
-        lift=[list(row(f"lift{i}", 2)) for i in n] if form.straightened else [],
-        station=row("station", form.fins) if form.straightened else (),
-        max_angle=row("max_angle", form.fins),
-        max_rate=row("max_rate", form.fins),
-        time_constant=row("time_constant", form.fins),
+        lift=[list(row(f"lift{i}", 2)) for i in n],
+        **{word: row(word, form.fins) for word in BY_FIN},
+        bend=Bend(*(one(f"fin_{word}") for word in BEND)),
+        **{word: one(word) for word in INFLOW},
     )
     constants = Constants(
         body=Body(*(one(name) for name in BODY)),
@@ -156,19 +175,13 @@ def system(form: Form, p: Sequence[Any]) -> System:
         fins=fins,
         screw=_screw(form, one, row) if form.rows else None,
         split=form.split,
-        options=_options(form, one),
+        options=ModelOptions(axisymmetric_crossflow=form.axisymmetric),
         extra=form.extra and form.extra.with_values({name: one(f"extra_{name}") for name in form.extra.values}),
         optional=form.optional,
     )
     current = [one(f"current_{way}") for way in ("north", "east", "down")]
     pilot = SimpleNamespace(**{name: one(f"pilot_{name}") for name in GAINS})
-    return System(constants, pilot, one("thrust"), current, one("fin_share"))
-
-
-def _options(form: Form, one: Any) -> ModelOptions:
-    if not form.straightened:
-        return ModelOptions(axisymmetric_crossflow=form.axisymmetric)
-    return ModelOptions(one("kappa_v"), one("kappa_r"), form.axisymmetric)
+    return System(constants, pilot, one("thrust"), current, one("fin_share"), form.damaged)
 
 
 def _screw(form: Form, one: Any, row: Any) -> Screw:

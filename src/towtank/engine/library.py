@@ -33,7 +33,7 @@ class Task(ctypes.Structure):
         ("plan_stride", _INTEGER), ("tick", _REAL), ("steps", _INTEGER), ("fastest", _REALS), ("gauges", _INTEGER),
         ("gauge", _REALS), ("channels", _INTEGER), ("channel", _INTEGERS), ("every", _INTEGER), ("samples", _INTEGER),
         ("log", _REALS), ("stats", _REALS), ("marks", _REALS), ("end", _REALS), ("status", _REALS),
-        ("stop", ctypes.c_void_p),
+        ("sensors", _REALS), ("seed", _INTEGER), ("stop", ctypes.c_void_p),
     )  # fmt: skip
 
 

@@ -114,10 +114,9 @@ def observe(s: System, x: Vector, orders: Vector, ops: Ops) -> list[Scalar]:
 
 def command(s: System, seen: Vector, memory: Vector, orders: Vector, ops: Ops) -> Steering:
     """What the pilot grants, from the channels ``seen`` (``observed`` or more), its ``memory`` (3) and ``orders``."""
-    fins = s.constants.fins
-    named = dict(zip(channels(len(fins.max_angle)), seen, strict=False))
+    named = dict(zip(channels(len(s.constants.fins.max_angle)), seen, strict=False))
     eyes = Seen(**{name: named[SEEN.get(name, name)] for name in Seen._fields})
-    return steer(s.pilot, fins.mixing, fins.max_angle, _orders(orders), eyes, memory, ops)
+    return steer(s.pilot, s.tail, _orders(orders), eyes, memory, ops)
 
 
 def dynamics(s: System, x: Vector, asked: Vector, ops: Ops) -> list[Scalar]:

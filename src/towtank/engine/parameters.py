@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from towtank.engine.form import ADDED, BODY, DAMPING, Form
+from towtank.engine.form import ADDED, BEND, BODY, BY_FIN, DAMPING, INFLOW, Form
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import STILL, Constants, Model
@@ -17,7 +17,7 @@ from towtank.pilot.law import GAINS, Pilot
 Places = NDArray[np.int64]
 """Places in the vector of parameters."""
 
-_POSITIVE = ("max_angle", "max_rate", "time_constant")
+_POSITIVE = ("max_angle", "max_rate", "time_constant", "fin_stall", "fin_width")
 
 MASS = (*BODY, *ADDED)
 """Parameters that change the mass matrix or may: those for which its inverse must be taken again."""
@@ -31,7 +31,7 @@ def parameters(form: Form, model: Model, pilot: Pilot, thrust: float, current: S
     values |= dict(zip(ADDED, np.asarray(k.added, dtype=float).ravel().tolist(), strict=True))
     values |= {"thrust": float(thrust)}
     values |= dict(zip(("current_north", "current_east", "current_down"), map(float, current), strict=True))
-    values |= _fins(form, k) | _options(form, k) | _screw(form, k)
+    values |= _fins(form, k) | _screw(form, k)
     if form.extra and k.extra:
         values |= {f"extra_{name}": float(value) for name, value in k.extra.values.items()}
     values |= {f"pilot_{name}": float(getattr(pilot, name)) for name in GAINS}
@@ -48,21 +48,14 @@ def _fins(form: Form, k: Constants) -> dict[str, float]:
     for i in range(have):
         for j in range(3):
             out[f"mixing{i}{j}"], out[f"unmixing{j}{i}"] = float(k.fins.mixing[i][j]), float(k.fins.unmixing[j][i])
-    for word in ("max_angle", "max_rate", "time_constant"):
-        values = getattr(k.fins, word)
-        out |= {f"{word}{i}": float(values[i]) if i < have else 1.0 for i in range(form.fins)}
-    return out | {"fin_share": 1.0 / max(have, 1)}
-
-
-def _options(form: Form, k: Constants) -> dict[str, float]:
-    if not form.straightened:
-        return {}
-    out = {"kappa_v": float(k.options.kappa_v), "kappa_r": float(k.options.kappa_r)}
+    for word in BY_FIN:
+        values, none = getattr(k.fins, word), float(word in _POSITIVE)
+        out |= {f"{word}{i}": float(values[i]) if i < have else none for i in range(form.fins)}
     for i in range(form.fins):
-        lift = k.fins.lift[i] if i < len(k.fins.lift) else (0.0, 0.0)
+        lift = k.fins.lift[i] if i < have else (0.0, 0.0)
         out |= {f"lift{i}0": float(lift[0]), f"lift{i}1": float(lift[1])}
-        out[f"station{i}"] = float(k.fins.station[i]) if i < len(k.fins.station) else 0.0
-    return out
+    out |= {f"fin_{word}": float(getattr(k.fins.bend, word)) for word in BEND}
+    return out | {word: float(getattr(k.fins, word)) for word in INFLOW} | {"fin_share": 1.0 / max(have, 1)}
 
 
 def _screw(form: Form, k: Constants) -> dict[str, float]:

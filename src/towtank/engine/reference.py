@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from towtank.engine.form import Form, System, system
-from towtank.engine.loop import channels, command, dynamics, observe, observed, states
+from towtank.engine.loop import SEEN, channels, command, dynamics, observe, observed, states
+from towtank.engine.noise import normal
 from towtank.engine.plan import Ended, Stat
 from towtank.engine.run import Arrays
 from towtank.frames import Array
-from towtank.model.algebra import MATH, NUMPY, Ops, product
-from towtank.pilot.law import wrapped
+from towtank.model.algebra import MATH, NUMPY, Ops
+from towtank.pilot.law import Seen, wrapped
 from towtank.pilot.orders import ORDERS
 from towtank.progress import Progress
 
@@ -43,6 +44,7 @@ def run_numpy(form: Form, arrays: Arrays, progress: Progress) -> None:
                 ticks += 1
                 lanes.tick(arrays.clock.tick * ticks)
                 if lanes.any(lanes.live):
+                    lanes.sense(ticks)
                     lanes.order(lanes.live)
             lanes.record(ticks)
     except KeyboardInterrupt:
@@ -94,6 +96,8 @@ class _Lanes:
         self.m = [self._value(row) for row in start[nx:]]
         self.y: list[Any] = [self._value(np.zeros(self.count))] * len(names)
         self.granted, self.asked, self.rates = [0.0] * 3, [0.0] * (form.fins + 1), [0.0] * 3
+        self.answered: list[Any] = [0.0] * form.fins
+        self.names, self.held = names, dict[int, Any]()
         zero = self._value(np.zeros(self.count))
         self.t, self.end, self.live = zero, zero, zero + 1.0
         self.leg = np.zeros(self.count, dtype=int)
@@ -146,13 +150,37 @@ class _Lanes:
 
     def order(self, c: Any) -> None:
         """New command for the lanes in ``c``."""
-        s = command(self.p, self.y, self.m, self.ref, self.tools.ops)
-        asked = [*product(self.p.constants.fins.mixing, s.granted), self.ref[THROTTLE]]
+        seen = list(self.y)
+        for channel, value in self.held.items():
+            seen[channel] = value
+        s = command(self.p, seen, self.m, self.ref, self.tools.ops)
+        asked = [*self.played(s.fins, c), self.ref[THROTTLE]]
         self.granted = [self.pick(c, a, b) for a, b in zip(s.granted, self.granted, strict=True)]
         self.asked = [self.pick(c, a, b) for a, b in zip(asked, self.asked, strict=True)]
         self.rates = [self.pick(c, a, b) for a, b in zip(s.memory_rates, self.rates, strict=True)]
         self.y[self.kept + 3] = self.pick(c, s.heading, self.y[self.kept + 3])
         self.y = [self.pick(c, a, b) for a, b in zip(self.keep(self.y), self.y, strict=True)]
+
+    def sense(self, n: int) -> None:
+        """The readings that are due in tick ``n``."""
+        for sensor, (name, (every, std, bias)) in enumerate(zip(Seen._fields, self.a.sensors, strict=False)):
+            if (every, std, bias) == (1.0, 0.0, 0.0) or n % int(every):
+                continue
+            channel, reading = self.names.index(SEEN.get(name, name)), n // int(every) + 1
+            off = std * normal(self.a.seed, self.count, sensor, reading) + bias * normal(
+                self.a.seed, self.count, sensor, 0
+            )
+            self.held[channel] = self._value(self._row(self.y[channel]) + off)
+
+    def played(self, wanted: list[Any], c: Any) -> list[Any]:
+        """Fin angles the actuators go for: a change below the dead band is not answered, then the play is taken up."""
+        fins, ops, out = self.p.constants.fins, self.tools.ops, []
+        for i, (want, band, play) in enumerate(zip(wanted, fins.dead_band, fins.backlash, strict=True)):
+            still = self.answered[i]
+            want = self.pick(ops.positive(ops.fabs(want - still) - band), want, still)
+            self.answered[i] = self.pick(c, want, still)
+            out.append(ops.fmax(want - play, ops.fmin(want + play, self.asked[i])))
+        return out
 
     def event(self, y: list[Any]) -> Array:
         """Distance (N,) of the event channel from its level."""
@@ -192,8 +220,9 @@ class _Lanes:
             self.begin(lane)
         before = [v * 0.0 for v in self.y]
         for i in range(self.fins):
-            before[self.delta + i] = self.x[len(self.x) - self.fins + i]
+            before[self.delta + i] = self.asked[i] = self.answered[i] = self.x[len(self.x) - self.fins + i]
         self.y = self.look(self.x, before)
+        self.sense(0)
         self.order(self.live)
         for lane in range(self.count):
             self.fresh(lane)

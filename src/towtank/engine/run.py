@@ -18,7 +18,7 @@ from towtank.engine.plan import Clock, Ended, Gauge, Leg, Log, Stat, gauge_table
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import STILL, Model
-from towtank.pilot.law import NO_PILOT, Pilot
+from towtank.pilot.law import NO_PILOT, Pilot, Seen
 from towtank.progress import Progress, Silent
 
 FASTEST = 10.0
@@ -44,6 +44,8 @@ class Arrays:
     clock: Clock
     every: int
     fastest: Array
+    sensors: Array
+    seed: int
 
     @property
     def count(self) -> int:
@@ -85,6 +87,7 @@ def fly(
     ensemble: Ensemble = ONE,
     progress: Progress | None = None,
     threads: int | None = None,
+    seed: int = 0,
 ) -> Flights:
     """Fly ``model`` through ``legs``.
 
@@ -94,6 +97,7 @@ def fly(
     thrust : [N].   current : (3,) [m/s, NED].   clock : control period and steps, ``clock_of`` when left out.
     log : what is kept over time, nothing when left out.   gauges : what is watched in every leg.
     ensemble : what differs between trajectories.   threads : that share them; all cores when left out.
+    seed : of the noise of the pilot's sensors; each trajectory has its own.
 
     An interruption (Ctrl-C) keeps the trajectories that have ended; the others are marked ``Ended.STOPPED``. A run of
     less than a tenth of a second cannot be interrupted.
@@ -106,7 +110,7 @@ def fly(
     form, clock = form_of(model), clock or clock_of(model, model.craft.speed)
     check_step(model, clock, ensemble.parameters)
     _check(model, thrust, current, legs, log, gauges, ensemble, threads)
-    arrays = _arrays(form, model, pilot or NO_PILOT, start, legs, thrust, current, clock, log, gauges, ensemble)
+    arrays = _arrays(form, model, pilot or NO_PILOT, start, legs, thrust, current, clock, log, gauges, ensemble, seed)
     compiled = library(form)
     if compiled is not None:
         from towtank.engine.threads import run_threads
@@ -145,7 +149,7 @@ def _check(
 
 def _arrays(
     form: Form, model: Model, pilot: Pilot, start: Sequence[float] | Array, legs: Sequence[Leg], thrust: float,
-    current: Sequence[float], clock: Clock, log: Log | None, gauges: Sequence[Gauge], ensemble: Ensemble,
+    current: Sequence[float], clock: Clock, log: Log | None, gauges: Sequence[Gauge], ensemble: Ensemble, seed: int,
 ) -> Arrays:  # fmt: skip
     count, fins = ensemble.count, form.fins
     names = channels(fins)
@@ -173,6 +177,7 @@ def _arrays(
         status=np.tile([float(Ended.STOPPED), 0.0], (count, 1)),
         clock=clock, every=log.every if log else 1,
         fastest=np.ascontiguousarray(np.broadcast_to(FASTEST * speed, (count,))),
+        sensors=np.zeros((0, 3)) if pilot.sensors.exact else pilot.sensors.table(Seen._fields, clock.tick), seed=seed,
     )  # fmt: skip
 
 

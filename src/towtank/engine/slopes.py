@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from towtank.engine.form import Form, form_of, system
+from towtank.engine.form import BY_FIN, PLAY, Form, form_of, system
 from towtank.engine.library import Library, Slope, library
 from towtank.engine.loop import KINEMATIC, MEMORY, channels, dynamics, load_through_water, observed, states
 from towtank.engine.parameters import parameters
@@ -230,12 +230,13 @@ def linear_at(
 def free_names(model: Model) -> tuple[str, ...]:
     """Names of the parameters of ``model`` that derivatives are taken to: all before the inverse of the mass matrix.
 
-    What only fills the compiled form is left out: fins and rows of the propeller's tables that the craft has not.
+    What only fills the compiled form is left out: fins and rows of the propeller's tables that the craft has not. So
+    are the dead band and the play of the actuators: a command that stays unanswered has no slope.
     """
     form, k = form_of(model), model.constants
     fins, rows = range(len(k.fins.station), form.fins), range(len(k.screw.kt.knots) if k.screw else 0, form.rows)
-    words = ("max_angle", "max_rate", "time_constant", "station")
-    hidden = {f"{word}{i}" for i in fins for word in words} | {f"lift{i}{j}" for i in fins for j in range(2)}
+    hidden = {f"{word}{i}" for word in PLAY for i in range(form.fins)}
+    hidden |= {f"{word}{i}" for i in fins for word in BY_FIN} | {f"lift{i}{j}" for i in fins for j in range(2)}
     hidden |= {name for i in fins for j in range(3) for name in (f"mixing{i}{j}", f"unmixing{j}{i}")}
     hidden |= {f"screw_{word}{i}" for i in rows for word in ("knot", "kt", "kq")}
     return tuple(name for name in form.names[: form.place["inverse00"]] if name not in hidden)
@@ -257,6 +258,11 @@ class _Run:
                 "TOWTANK_ENGINE unset. `jacobian` and `linear_at` work without it."
             )
         self.compiled: Library = compiled
+        if any(value for word in PLAY for value in getattr(model.constants.fins, word)):
+            raise InputError(
+                f"craft {model.craft.name}: its fins have a dead band or play, so a run has no slopes: a small change "
+                "of the command stays unanswered. Set dead_band and backlash to zero for derivatives."
+            )
         self.p = parameters(self.form, model, pilot, thrust, current)
         size = KINEMATIC + self.form.fins + len(MEMORY)
         self.real = np.array([i for i in range(size) if not KINEMATIC + have <= i < KINEMATIC + self.form.fins])

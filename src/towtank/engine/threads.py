@@ -84,5 +84,5 @@ def _task(a: Arrays, first: int, last: int, stop: ctypes.c_int32) -> Task:
         tick=a.clock.tick, steps=a.clock.steps, fastest=address(a.fastest), gauges=len(a.gauge), gauge=address(a.gauge),
         channels=len(a.channel), channel=address(a.channel), every=a.every, samples=a.log.shape[1], log=address(a.log),
         stats=address(a.stats), marks=address(a.marks), end=address(a.end), status=address(a.status),
-        stop=ctypes.addressof(stop),
+        sensors=address(a.sensors), seed=a.seed, stop=ctypes.addressof(stop),
     )  # fmt: skip

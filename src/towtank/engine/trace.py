@@ -8,10 +8,11 @@ from typing import Any, cast
 
 from towtank.engine.emit import c_function, c_pattern
 from towtank.engine.form import Form, system
-from towtank.engine.loop import MEMORY, channels, command, dynamics, load_through_water, observe, observed, states
-from towtank.model.algebra import ZERO, Ops, product
+from towtank.engine.loop import MEMORY, SEEN, channels, command, dynamics, load_through_water, observe, observed, states
+from towtank.model.algebra import ZERO, Ops
 from towtank.model.equations import Constants
 from towtank.model.rigid_body import mass_matrix
+from towtank.pilot.law import Seen
 from towtank.pilot.orders import ORDERS
 
 
@@ -46,6 +47,7 @@ class Traced:
             "NA": n + 1,
             "NS": observed(n), "NY": len(names), "PSI": names.index("psi"), "Z": names.index("z"),
             "DELTA": names.index("delta1"), "SPEED": names.index("speed"),
+            "DEAD_BAND": self.form.place["dead_band0"], "BACKLASH": self.form.place["backlash0"],
             "FIN_SHARE": self.form.place["fin_share"], "INVERSE": self.form.place["inverse00"],
         }  # fmt: skip
 
@@ -66,7 +68,7 @@ def traced(form: Form) -> Traced:
     direct = ca.vertcat(*dynamics(weightless, listed["x"], listed["asked"], ops))
     seen = ca.vertcat(*observe(s, listed["x"], listed["orders"], ops))
     steering = command(s, listed["seen"], listed["memory"], listed["orders"], ops)
-    asked = [*product(s.constants.fins.mixing, steering.granted), listed["orders"][ORDERS.index("throttle")]]
+    asked = [*steering.fins, listed["orders"][ORDERS.index("throttle")]]
     steered = [ca.vertcat(*part) for part in (steering.granted, asked, steering.memory_rates, [steering.heading])]
     load = ca.vertcat(*load_through_water(s, listed["x"], listed["asked"][-1], ops))
     e = SimpleNamespace(rates=rates, direct=direct, seen=seen, steered=steered, load=load, mass=_mass(s.constants))
@@ -161,6 +163,9 @@ def model_header(trace: Traced) -> str:
     """C text ``model.h`` of the closed loop: sizes, then the three functions."""
     lines = [f"/* {trace.form.word} */"]
     lines += [f"#define {name} {value}" for name, value in trace.numbers.items()]
+    names = channels(trace.form.fins)
+    seen = [str(names.index(SEEN.get(name, name))) for name in Seen._fields]
+    lines += [f"#define NSEEN {len(seen)}", f"static const int SEEN_AT[NSEEN] = {{{', '.join(seen)}}};"]
     for function in trace.functions.values():
         text, flops = c_function(function)
         lines += [f"#define FLOPS_{function.name().upper()} {flops}", text]

@@ -28,13 +28,13 @@ from towtank.model.extra import ExtraLoad, check_extra, extra_load
 from towtank.model.fins import (
     FinSet,
     actuator_rates,
-    effective_angles,
     fin_angles,
     fin_load,
     fin_set,
     virtual_angles,
 )
 from towtank.model.kinematics import euler_matrix, quaternion_matrix, quaternion_rates, rotation_matrix, trig_of
+from towtank.model.options import ModelOptions
 from towtank.model.restoring import restoring_vector
 from towtank.model.rigid_body import Body, body_of, coriolis_matrix, mass_matrix
 from towtank.model.thrust import Screw, screw_of, steady_thrust, thrust_load
@@ -48,26 +48,6 @@ STILL = (0.0, 0.0, 0.0)
 
 LEVEL = (0.0, 0.0, 1.0)
 """Gravity in the body axes of a level craft."""
-
-
-@dataclass(frozen=True)
-class ModelOptions:
-    """Choices of the model that no captive test decides.
-
-    kappa_v, kappa_r : straightening factors for drift and for turning (see ``fins.effective_angles``).
-    axisymmetric_crossflow : cross-flow terms grow with the total cross-flow (see ``damping.damping_matrix``).
-    centre_of_buoyancy : (3,) [m] from the body origin; None takes it from hull and fins.
-    """
-
-    kappa_v: float = 0.0
-    kappa_r: float = 0.0
-    axisymmetric_crossflow: bool = False
-    centre_of_buoyancy: tuple[float, float, float] | None = None
-
-    @property
-    def straightened(self) -> bool:
-        """True unless both factors are the number zero; a symbol counts as a factor."""
-        return any(not isinstance(kappa, int | float) or kappa != 0.0 for kappa in (self.kappa_v, self.kappa_r))
 
 
 @dataclass(frozen=True)
@@ -102,8 +82,6 @@ def parts(k: Constants, nu: Vector, down: Vector, delta: Vector, thrust: Scalar,
     options = k.options
     coriolis = coriolis_full if k.split else coriolis_reduced
     extra = {"extra": extra_load(k.extra, nu, down, delta, ops)} if k.extra else {}
-    if options.straightened:
-        delta = effective_angles(k.fins, nu, delta, options.kappa_v, options.kappa_r, ops)
     force, torque = thrust_load(k.screw, thrust, nu[0], ops)
     damping = product(damping_matrix(k.c, nu, ops, options.axisymmetric_crossflow), nu)
     if k.optional:
@@ -113,7 +91,7 @@ def parts(k: Constants, nu: Vector, down: Vector, delta: Vector, thrust: Scalar,
         "added mass": product(coriolis(k.added, nu), nu),
         "damping": damping,
         "restoring": [-x for x in restoring_vector(k.body, down)],
-        "fins": fin_load(k.c, k.fins, nu[0], delta, ops),
+        "fins": fin_load(k.c, k.fins, nu, delta, ops),
         "thrust": [force, 0.0, 0.0, torque, 0.0, 0.0],
         **extra,
     }
@@ -246,13 +224,19 @@ class Model:
             c=c,
             added=added_mass_matrix(values),
             mass_inverse=frozen(_inverse(self.mass_matrix, self.derivatives.craft)),
-            fins=fin_set(self.craft),
+            fins=self._fin_set(),
             screw=screw_of(self.craft, -c.Xuu),
             split=self.derivatives.variant == "split",
             options=self.options,
             extra=self.extra,
             optional=any(values.get(name) for group in OPTIONAL.values() for name in group),
         )
+
+    def _fin_set(self) -> FinSet:
+        o, curve = self.options, self.derivatives.fin_curve
+        found = fin_set(self.craft, curve, o.faults, o.fins_apart)
+        given = {name: kappa for name in ("kappa_v", "kappa_r") if (kappa := getattr(o, name)) is not None}
+        return replace(found, **given)
 
     @cached_property
     def body(self) -> Body:

@@ -15,7 +15,9 @@ from towtank.craft.hull import Ellipsoid, Myring, Offsets, Suboff
 from towtank.derive.files import document as derivatives_document
 from towtank.derive.files import from_document as derivatives_of
 from towtank.errors import ArtefactError, InputError
-from towtank.model.equations import Model, ModelOptions
+from towtank.model.equations import Model
+from towtank.model.faults import faults_document, faults_of
+from towtank.model.options import ModelOptions
 from towtank.provenance import digest, provenance
 from towtank.water import Water
 
@@ -47,7 +49,11 @@ def write_model(model: Model, path: str | Path) -> Path:
     document = {
         "schema": SCHEMA,
         "craft": _craft_document(craft),
-        "options": {**asdict(model.options), "centre_of_buoyancy": [model.body.xB, model.body.yB, model.body.zB]},
+        "options": {
+            **asdict(model.options),
+            "faults": faults_document(model.options.faults),
+            "centre_of_buoyancy": [model.body.xB, model.body.yB, model.body.zB],
+        },
         "mass_matrix": model.mass_matrix,
         "derivatives": derivatives_document(derivatives),
         "provenance": provenance({"craft": digest(craft), "derivatives": digest(derivatives.as_dict())}),
@@ -70,7 +76,13 @@ def read_model(path: str | Path) -> Model:
         return Model(
             _craft(document["craft"]),
             derivatives_of(document["derivatives"]),
-            ModelOptions(**{**options, "centre_of_buoyancy": tuple(options["centre_of_buoyancy"])}),
+            ModelOptions(
+                **{
+                    **options,
+                    "centre_of_buoyancy": tuple(options["centre_of_buoyancy"]),
+                    "faults": faults_of(options.get("faults", ())),
+                }
+            ),
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ArtefactError(

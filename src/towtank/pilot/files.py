@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from towtank.artefact import read_json, write_json
 from towtank.errors import ArtefactError
 from towtank.pilot.law import GAINS, Pilot
+from towtank.pilot.sensors import Reading, Sensors
 from towtank.provenance import provenance
 
 SCHEMA = "towtank/pilot/1"
@@ -43,6 +45,7 @@ def write_pilot(pilot: Pilot, path: str | Path) -> Path:
         "gains": {name: {"value": getattr(pilot, name), "unit": UNITS[name]} for name in GAINS},
         "eigenvalues": {loop: [[s.real, s.imag] for s in values] for loop, values in pilot.eigenvalues.items()},
         "margins": {loop: dict(zip(_MARGINS, values, strict=True)) for loop, values in pilot.margins.items()},
+        "sensors": asdict(pilot.sensors),
         "notes": list(pilot.notes),
         "provenance": provenance(),
     }
@@ -68,6 +71,7 @@ def read_pilot(path: str | Path) -> Pilot:
                 for loop, values in document["eigenvalues"].items()
             },
             margins={loop: _margins(values) for loop, values in document["margins"].items()},
+            sensors=Sensors(**{name: Reading(**reading) for name, reading in document.get("sensors", {}).items()}),
             notes=tuple(str(note) for note in document["notes"]),
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:

@@ -11,14 +11,17 @@ from dataclasses import dataclass, field, fields
 from math import pi
 from typing import Any, NamedTuple
 
-from towtank.model.algebra import Matrix, Ops, Scalar, Vector
-from towtank.pilot.allocation import ROUND_OFF, share
+from towtank.model.algebra import Ops, Scalar, Vector
+from towtank.pilot.allocation import ROUND_OFF, Allocation, allocate
 from towtank.pilot.guidance import line_of_sight
+from towtank.pilot.sensors import EXACT, Sensors
 
 SLOWEST = 0.3
 """Smallest fraction of the design speed at which the schedule still raises the gains; 1/0.3^2 is a factor of 11."""
 MEMORY = 3
 """States of the pilot: trim of the rudder [rad], trim of the elevator [rad], integral of the guidance [m]."""
+_MET = 1e-3
+"""Part of a command [rad] that damaged fins may leave without being full."""
 _STANDSTILL = 1e-9
 """Speed [m/s] or gain [1/s] that stands for zero where one is a divisor."""
 
@@ -42,6 +45,7 @@ class Pilot:
     unwind [s] : time in which a saturated fin takes back what its trim cannot use.
     heading_band [rad], depth_band [m] : largest errors the trims integrate, so that a large step does not fill them.
     reversal [m/s] : speed below which the elevator acts reversed on depth; 0 if there is none below ``speed``.
+    sensors : what the craft is seen through.
     eigenvalues : loop -> closed-loop eigenvalues [1/s].   margins : loop -> (largest gain factor, smallest gain factor,
     phase margin [rad]).   notes : what the pilot cannot do, in words.
     """
@@ -68,13 +72,14 @@ class Pilot:
     heading_band: float = 0.0
     depth_band: float = 0.0
     reversal: float = 0.0
+    sensors: Sensors = EXACT
     eigenvalues: Mapping[str, tuple[complex, ...]] = field(default_factory=dict)
     margins: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
 GAINS: tuple[str, ...] = tuple(
-    f.name for f in fields(Pilot) if f.name not in {"craft", "eigenvalues", "margins", "notes"}
+    f.name for f in fields(Pilot) if f.name not in {"craft", "sensors", "eigenvalues", "margins", "notes"}
 )
 """Names of the numbers the law uses, ``speed`` to ``reversal``, in the order in which they are packed."""
 
@@ -104,18 +109,19 @@ class Seen(NamedTuple):
 
 
 class Steering(NamedTuple):
-    """granted (3,) : virtual rudder, elevator, aileron [rad] within the fins' limits.
+    """fins (n,) : angles asked [rad].   granted (3,) : the virtual rudder, elevator, aileron they amount to.
 
     memory_rates (3,) : of the trims [rad/s] and the guidance integral [m/s].   heading : wanted [rad], psi where none
     is ordered.
     """
 
+    fins: list[Scalar]
     granted: list[Scalar]
     memory_rates: list[Scalar]
     heading: Scalar
 
 
-def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memory: Vector, ops: Ops) -> Steering:
+def steer(pilot: Any, tail: Allocation, orders: Any, seen: Any, memory: Vector, ops: Ops) -> Steering:
     """Command of the pilot under ``orders``.
 
     Without a pilot (``orders.piloted`` 0) the command is the ordered rudder and elevator, rudder first, and the memory
@@ -123,7 +129,7 @@ def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memo
 
     Parameters
     ----------
-    pilot : gains, see ``GAINS``.   rows (n, 3), limits (n,) [rad] : of the fins.   orders : see ``Orders``.
+    pilot : gains, see ``GAINS``.   tail : mixing, limits and known damage of the fins.   orders : see ``Orders``.
     seen : see ``Seen``.   memory (3,) : trims of rudder and elevator [rad], integral of the guidance [m].
 
     Source     perron (heading and depth from rudder and elevator); cascade of the LAUV (THEORY section 7).
@@ -143,8 +149,11 @@ def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memo
         _choose(diving, elevator, orders.elevator),
         orders.piloted * orders.damp_roll * aileron,
     ]
-    granted = share(asked, rows, limits, (1.0 - steering * (1.0 - diving), steering), ops)
+    fins, granted = allocate(asked, tail, (1.0 - steering * (1.0 - diving), steering), ops)
     over = [want - got for want, got in zip(asked, granted, strict=True)]
+    if tail.damage is not None:
+        # The shared command is met to the weight of the fin angles, which must not count as a limit.
+        over = [x * ops.positive(ops.fabs(x) - _MET) for x in over]
     lag = (orders.turn - seen.r) / ops.fmax(pilot.heading, _STANDSTILL)
     to_heading = pilot.heading_integral * clamp(_choose(orders.turning, lag, off), pilot.heading_band, ops)
     to_depth = pilot.depth_integral * clamp(deep, pilot.depth_band, ops)
@@ -153,7 +162,7 @@ def steer(pilot: Any, rows: Matrix, limits: Vector, orders: Any, seen: Any, memo
         _trim_rate(to_depth, diving * pitching, memory[1], over[1], pilot.unwind, ops),
         orders.piloted * orders.track * drifting,
     ]
-    return Steering(granted, rates, wanted)
+    return Steering(fins, granted, rates, wanted)
 
 
 def schedule(pilot: Any, u: Scalar, ops: Ops) -> Scalar:

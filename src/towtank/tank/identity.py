@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from towtank.craft.craft import Craft
+from towtank.craft.craft import ACTUATOR, Craft
 from towtank.plan.kinds import CaptiveTest, Plan
 from towtank.plan.standard import slug
 from towtank.provenance import digest
@@ -40,10 +40,7 @@ def wetted_shape(craft: Craft) -> dict[str, Any]:
         "profile": craft.profile.kind,
         "length": length,
         "radii": np.round(radii, 9) + 0.0,
-        "fins": [
-            {k: v for k, v in vars(fin).items() if k not in ("max_angle", "max_rate", "time_constant")}
-            for fin in craft.fins
-        ],
+        "fins": [{k: v for k, v in vars(fin).items() if k not in ACTUATOR} for fin in craft.fins],
         "origin": craft.origin_from_nose,
         "water": craft.water,
     }

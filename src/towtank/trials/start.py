@@ -140,12 +140,19 @@ def setting(model: Model, speed: Quantity | None, pilot: Pilot | None = None, *,
         raise InputError(f"speed {U:g} m/s: a free-running trial needs forward speed. Give a positive one.")
     trim = level_trim(model, U)
     pilot = (pilot or design_pilot(model, U)) if piloted else None
-    fins = model.craft.mixing[:, 1] * trim.elevator if model.craft.fins else np.zeros(0)
+    fins = _at_start(model, model.craft.mixing[:, 1] * trim.elevator) if model.craft.fins else np.zeros(0)
     # The elevator's trim carries what the pitch feedback asks for in level flight: the pilot starts at rest.
     asked = float(schedule(pilot, trim.u, MATH)) * (pilot.pitch * trim.pitch + pilot.heave * trim.w) if pilot else 0.0
     carried = trim.elevator + asked if pilot else 0.0
     state = [0.0, 0.0, 0.0, 0.0, trim.pitch, 0.0, trim.u, 0.0, trim.w, 0.0, 0.0, 0.0, *fins]
     return Setting(U, trim, np.array(state), (0.0, carried, 0.0), pilot, float(model.thrust(U)), model.craft.length / U)
+
+
+def _at_start(model: Model, delta: Array) -> Array:
+    """Fin angles (n,) [rad] that start at ``delta`` but for jammed fins and those that do not reach it."""
+    fins = model.constants.fins
+    stuck, limits = np.array(fins.stuck), np.array(fins.max_angle)
+    return np.asarray(np.clip(np.where(stuck > 0.0, fins.stuck_angle, delta), -limits, limits))
 
 
 def angle(value: Quantity, where: str, limit: float, reason: str) -> float:

@@ -13,6 +13,8 @@ enum { HEAD = LEG_HEAD, MOST = 32, SEARCH = 12 };
 typedef struct {
   T p[NP], x[NX], m[NM], y[NY], ref[NO];
   T granted[3], asked[NA], rates[NM];
+  T answered[NF];                       /* fin angles the actuators have answered */
+  T held[NSEEN];                        /* what the sensors have read */
   T t, end, live;                       /* time, end of the leg, 1.0 while running */
   T channel, absolute, level, side;     /* event of the leg, and the side of it the leg began on; 0.0 on the level itself */
   T fastest;
@@ -52,11 +54,57 @@ INLINE void keep(const Pack *k, T *y) {
   for (int i = 0; i < 3; i++) { y[NS + i] = k->granted[i]; y[NS + 4 + i] = k->m[i]; }
 }
 
+#if LANES == 1
+#define SET(v, l, value) ((v) = (value))
+#else
+#define SET(v, l, value) ((v)[l] = (value))
+#endif
+
+INLINE uint64_t mixed(uint64_t z) {
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return z ^ (z >> 31);
+}
+
+/* A standard normal number of a trajectory's sensor and reading: splitmix64 of their numbers, Box and Muller. */
+static double normal(int64_t seed, int64_t at, int64_t sensor, int64_t reading) {
+  uint64_t z = (uint64_t)seed * 0xD1342543DE82EF95u + (uint64_t)at * 0x9FB21C651E98DF25u
+      + (uint64_t)sensor * 0xC2B2AE3D27D4EB4Fu + (uint64_t)reading * 0x165667B19E3779F9u;
+  double u = ((double)(mixed(z + 0x9E3779B97F4A7C15u) >> 11) + 0.5) * 0x1p-53;
+  double v = (double)(mixed(z + 0x3C6EF372FE94F82Au) >> 11) * 0x1p-53;
+  return sqrt(-2.0 * log(u)) * cos(2.0 * PI * v);
+}
+
+/* True for a channel that the pilot sees as it is. */
+INLINE int exact(const double *sensor) { return sensor[0] == 1.0 && sensor[1] == 0.0 && sensor[2] == 0.0; }
+
+/* The readings that are due in tick n. */
+static void sense(const Task *a, Pack *k, int64_t n) {
+  if (!a->sensors) return;
+  for (int s = 0; s < NSEEN; s++) {
+    const double *sensor = a->sensors + 3 * s;
+    int64_t every = (int64_t)sensor[0];
+    if (exact(sensor) || n % every) continue;
+    EACH(l) {
+      double off = sensor[1] * normal(a->seed, k->at[l], s, n / every + 1) + sensor[2] * normal(a->seed, k->at[l], s, 0);
+      SET(k->held[s], l, LANE(k->y[SEEN_AT[s]], l) + off);
+    }
+  }
+}
+
 /* New orders and command for the lanes in c. */
-static __attribute__((noinline)) void order(Pack *k, T c) {
-  T granted[3], asked[NA], rates[NM], heading[1];
-  steer(k->p, k->y, k->m, k->ref, granted, asked, rates, heading);
+static __attribute__((noinline)) void order(const Task *a, Pack *k, T c) {
+  T granted[3], asked[NA], rates[NM], heading[1], seen[NY];
+  memcpy(seen, k->y, sizeof seen);
+  if (a->sensors)
+    for (int s = 0; s < NSEEN; s++) if (!exact(a->sensors + 3 * s)) seen[SEEN_AT[s]] = k->held[s];
+  steer(k->p, seen, k->m, k->ref, granted, asked, rates, heading);
   for (int i = 0; i < 3; i++) k->granted[i] = PICK(c, granted[i], k->granted[i]);
+  for (int i = 0; i < NF; i++) { /* a change below the dead band is not answered, then the play is taken up */
+    T want = PICK(LESS(k->p[DEAD_BAND + i], ABS(asked[i] - k->answered[i])), asked[i], k->answered[i]);
+    k->answered[i] = PICK(c, want, k->answered[i]);
+    asked[i] = MAX(want - k->p[BACKLASH + i], MIN(want + k->p[BACKLASH + i], k->asked[i]));
+  }
   for (int i = 0; i < NA; i++) k->asked[i] = PICK(c, asked[i], k->asked[i]);
   for (int i = 0; i < NM; i++) k->rates[i] = PICK(c, rates[i], k->rates[i]);
   k->y[NS + 3] = PICK(c, heading[0], k->y[NS + 3]);
@@ -75,12 +123,6 @@ INLINE T event(const Pack *k, const T *y) {
 #endif
   return PICK(k->absolute, ABS(v), v) - k->level;
 }
-
-#if LANES == 1
-#define SET(v, l, value) ((v) = (value))
-#else
-#define SET(v, l, value) ((v)[l] = (value))
-#endif
 
 /* Side of its level an event stands on; round-off of the search that ended the leg before counts as on the level. */
 INLINE T side_of(T e) { return WHERE(LESS(C(EPS), ABS(e)), SIGN(e)); }
@@ -187,7 +229,7 @@ static __attribute__((noinline)) void turn_over(const Task *a, Pack *k, T c) {
     T y[NY];
     look(k, k->y, y); /* distances along and across belong to the new leg's line */
     for (int i = 0; i < NY; i++) k->y[i] = PICK(changed, y[i], k->y[i]);
-    order(k, changed);
+    order(a, k, changed);
     EACH(l) if (LANE(changed, l) != 0.0) { /* with the new line in the channels */
       SET(k->side, l, LANE(side_of(event(k, k->y)), l));
       fresh(a, k, l);
@@ -260,10 +302,11 @@ static void load(const Task *a, Pack *k, int64_t first) {
     SET(k->live, l, 1.0);
     SET(k->fastest, l, a->fastest[k->at[l]]);
   }
-  for (int i = 0; i < NF; i++) none[DELTA + i] = k->x[NX - NF + i];
+  for (int i = 0; i < NF; i++) none[DELTA + i] = k->asked[i] = k->answered[i] = k->x[NX - NF + i];
   EACH(l) begin(a, k, l); /* the orders, which the channels need */
   look(k, none, k->y);
-  order(k, C(1.0));
+  sense(a, k, 0);
+  order(a, k, C(1.0));
   EACH(l) begin(a, k, l);
 }
 
@@ -281,7 +324,7 @@ __attribute__((visibility("default"))) int64_t NAME(run)(const Task *a) {
       record(a, &k, n, first);
       n++;
       tick(a, &k, a->tick * (double)n);
-      if (any(k.live)) order(&k, k.live);
+      if (any(k.live)) { sense(a, &k, n); order(a, &k, k.live); }
     }
     int stopped = a->stop && *a->stop;
     if (!stopped) record(a, &k, n, first);

@@ -33,6 +33,8 @@ typedef struct {
   double *marks;               /* (count, legs, 2 + NY) time, what ended it, channels; or null */
   double *end;                 /* (count, NX + NM) */
   double *status;              /* (count, 2) code, time */
+  const double *sensors;       /* (NSEEN, 3) of what the pilot sees: ticks between readings, std, std of the offset; or null */
+  int64_t seed;                /* of their noise */
   const volatile int32_t *stop;
 } Task;
 #endif

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from towtank.craft.craft import Craft
+from towtank.craft.craft import ACTUATOR, Craft
 from towtank.errors import TankError
 from towtank.frames import Array
 from towtank.plan.kinds import CaptiveTest
@@ -230,6 +230,6 @@ def _mirrored(craft: Craft, angles: tuple[float, ...]) -> bool:
 def _same(fin: object, other: object) -> bool:
     ours, theirs = dict(vars(fin)), dict(vars(other))
     turn = ours.pop("azimuth") - theirs.pop("azimuth")
-    for key in ("max_angle", "max_rate", "time_constant"):
+    for key in ACTUATOR:
         ours.pop(key), theirs.pop(key)
     return abs(math.remainder(turn, 2.0 * math.pi)) < AZIMUTH_TOLERANCE and ours == theirs
