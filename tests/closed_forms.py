@@ -105,9 +105,10 @@ class Linear:
 
     def until(self, place, level, s, delta, stride):
         """Time and state when entry ``place`` first passes ``level``; ``stride`` is shorter than any swing."""
-        t, here = 0.0, s[place] - level
+        t, here, grown, leap = 0.0, s[place] - level, np.append(s, delta), expm(self._grown * stride)
         while True:
-            there = self.at(t + stride, s, delta)[place] - level
+            grown = leap @ grown
+            there = grown[place] - level
             if t > 0.0 and here * there <= 0.0:
                 break
             t, here = t + stride, there
