@@ -1,4 +1,4 @@
-"""Open-loop trials against closed forms of the linear model."""
+"""Open-loop trials against the linear model; ``test_trials_exact`` has the crafts that are exactly linear."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
 from scipy.signal import StateSpace, lsim
 
 import synthetic_craft as synthetic
@@ -18,7 +17,6 @@ from towtank.trials.spiral import spiral
 from towtank.trials.start import ballasted, level_trim, setting, slowest_level_speed
 from towtank.trials.steady import steady_turns
 from towtank.trials.straight import straight_run
-from towtank.trials.zigzag import zigzag
 
 LINEAR = {**synthetic.STABLE, "Yvv": 0.0, "Nvv": 0.0, "Nrr": 0.0, "Xvr": 0.0, "Xrr": 0.0, "Xuudd": 0.0}
 
@@ -73,23 +71,6 @@ def test_distances_of_the_circle_are_those_of_the_linear_response(linear, gentle
     assert gentle.indices["transfer"][0] == pytest.approx(-east[quarter], rel=0.01)
     assert gentle.indices["tactical_diameter"][0] == pytest.approx(-east[half], rel=0.01)
     assert gentle.indices["time_to_90"][0] == pytest.approx(time[quarter], rel=0.03)
-
-
-def test_zigzag_follows_the_first_order_model():
-    # Without Nuv and the yaw-sway added mass, yaw is Nomoto's first-order model: T dr/dt + r = K dr.
-    model = synthetic.model({**LINEAR, "Nuv": 0.0, "Nvdot": 0.0, "Yrdot": 0.0}, zg=0.01, lag=0.03, rate=300.0)
-    d, inertia = model.derivatives, model.mass_matrix[5, 5]
-    # The lag of the fins adds to the time constant.
-    K, T = abs(d["Nuudr"] / d["Nur"]), -inertia / d["Nur"] + model.craft.fins[0].time_constant
-    delta = np.radians(2.0)
-    begin = brentq(lambda t: K * (t - T * (1.0 - np.exp(-t / T))) - 1.0, 1e-3, 1e4)
-    rate = K * delta * (1.0 - np.exp(-begin / T))
-    check = T * np.log(1.0 + rate / (K * delta))
-    trial = zigzag(model, "2 deg", "2 deg").indices
-    # Quick fins: what is left of their lag is 0.03 s beside T of some 8 s; 1 % of speed is lost to sway.
-    assert trial["initial_turning_time"][0] == pytest.approx(begin, rel=0.02)
-    assert trial["time_to_check_first"][0] == pytest.approx(check, rel=0.03)
-    assert np.radians(trial["first_overshoot"][0]) == pytest.approx(T * rate - K * delta * check, rel=0.03)
 
 
 def test_spiral_of_a_stable_craft_has_no_loop_and_the_slope_of_the_linear_model(stable):
