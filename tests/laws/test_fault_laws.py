@@ -14,13 +14,15 @@ import synthetic_craft as synthetic
 from towtank.craft.hull import Ellipsoid
 from towtank.craft.library import read_craft
 from towtank.derive.fin_curve import FinCurve
-from towtank.engine.plan import Leg, Log
+from towtank.engine.plan import Clock, Leg, Log
 from towtank.engine.run import fly
+from towtank.engine.slopes import linear_at, record_of, sensitivities
 from towtank.engine.start import at
 from towtank.errors import InputError
 from towtank.model.algebra import MATH
 from towtank.model.faults import Jammed, Limited, Lost
 from towtank.model.files import read_model, write_model
+from towtank.model.linear import linearise_at
 from towtank.pilot.allocation import LEAST, Allocation, Damage, allocation, reallocate
 from towtank.pilot.design import design_pilot
 from towtank.pilot.orders import Orders
@@ -175,6 +177,19 @@ def test_a_limited_fin_keeps_to_its_limit_and_the_others_serve_the_command(craft
     done = flown(limited, [Leg("turn", replace(HELD, heading=1.0), 60.0)], design_pilot(craft))
     assert np.abs(done.series("delta1")[0]).max() <= 0.05 + 1e-12
     assert np.abs(done.series("delta4")[0]).max() > 0.06
+
+
+def test_a_damaged_craft_has_linear_models_and_no_slopes_along_a_run(craft):
+    jammed = craft.with_options(faults=(Jammed(craft.craft.fins[0].name, 0.1),))
+    state = [0.0] * 6 + [1.0, 0.02] + [0.0] * 4 + [0.1, 0.0, 0.0, 0.0]
+    found, wanted = linear_at(jammed, state, 30.0), linearise_at(jammed, state, 30.0)
+    np.testing.assert_allclose(found.A, wanted.A, rtol=1e-10, atol=1e-13)
+    record = record_of([Leg("go", HELD, 2.0)], Clock(0.1, 2))
+    given = {"thrust": 30.0, "pilot": design_pilot(craft)}
+    with pytest.raises(InputError, match="no slopes"):
+        sensitivities(jammed, at(state), record, ("psi",), ("Yuv",), **given)
+    with pytest.raises(InputError, match="dead band or play"):
+        sensitivities(with_actuator(craft, backlash=0.01), at(state), record, ("psi",), ("Yuv",), **given)
 
 
 def test_faults_are_part_of_the_models_file(craft, tmp_path):

@@ -101,11 +101,11 @@ def compiler() -> str | None:
 
 
 def c_text(form: Form) -> dict[str, str]:
-    """File name -> C text of ``form``. The same form gives the same bytes in every process."""
+    """File name -> C text of ``form``, with ``slopes.h`` if it is smooth; the same bytes everywhere."""
     from towtank.engine.trace import model_header, slopes_header, traced
 
     trace = traced(form)
-    return {"model.h": model_header(trace), "slopes.h": slopes_header(trace)}
+    return {"model.h": model_header(trace)} | ({"slopes.h": slopes_header(trace)} if form.smooth else {})
 
 
 def compile_library(texts: dict[str, str], target: Target, out: Path) -> Path:
@@ -168,6 +168,7 @@ def _commands(cc: str, job: Job, work: Path) -> list[list[str]]:
         [cc, *_FLAGS, *job.target.flags, f"-I{work}", f"-I{C_SOURCES}", f"-DLANES={lanes}", f"-DWIDE={wide}",
          f"-DNAME(x)=x##_{suffix}", "-c", str(C_SOURCES / f"{source}.c"), "-o", str(work / f"{source}_{suffix}.o")]
         for source, suffix, lanes in (("slopes", "one", 1), ("loop", "pack", wide), ("loop", "one", 1))
+        if source == "loop" or "slopes.h" in job.texts
     ]  # fmt: skip
 
 

@@ -66,9 +66,14 @@ class Form:
         return (
             self.fins == SHIPPED_FINS
             and self.rows in (0, SHIPPED_ROWS)
-            and not (self.axisymmetric or self.extra or self.damaged)
+            and not (self.axisymmetric or self.extra or (self.damaged and (self.split or self.optional)))
             and not (self.optional and self.split)
         )
+
+    @property
+    def smooth(self) -> bool:
+        """True where derivatives along a run are compiled too; sharing among damaged fins is a search that has none."""
+        return not self.damaged
 
     @property
     def word(self) -> str:
@@ -106,10 +111,12 @@ class Form:
 
 
 SHIPPED = tuple(
-    Form(split=split, rows=rows, optional=optional)
-    for split, optional in ((False, False), (True, False), (False, True))
+    Form(split=split, rows=rows, optional=optional, damaged=damaged)
+    for split, optional, damaged in (
+        (False, False, False), (True, False, False), (False, True, False), (False, False, True),
+    )
     for rows in (0, SHIPPED_ROWS)
-)
+)  # fmt: skip
 """The forms compiled at install."""
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -170,7 +170,7 @@ def jacobian(
     InputError
         Shapes that do not belong together, or a number that is not finite.
     """
-    form, have = form_of(model), len(model.craft.fins)
+    form, have = _smooth(form_of(model)), len(model.craft.fins)
     x, u = np.atleast_2d(np.asarray(state, dtype=float)), np.atleast_2d(np.asarray(asked, dtype=float))
     count, names = len(x), free_names(model)
     if x.shape != (count, KINEMATIC + have) or u.shape != (count, have):
@@ -208,7 +208,7 @@ def linear_at(
     """
     x, turned_model = np.asarray(state, dtype=float), with_slopes(model, slopes)
     usable = x.shape == (len(model.states),) and bool(np.isfinite([*x, thrust, *current]).all()) and np.cos(x[4]) > 0.0
-    if not usable or library(form_of(model)) is None:
+    if not usable or library(_smooth(form_of(model))) is None:
         return linearise_at(model, list(state), thrust, current, slopes)
     model = turned_model
     e = quaternion_of(variables(x[3:6]), DUAL)
@@ -250,6 +250,11 @@ class _Run:
         pilot: Pilot, current: Sequence[float],
     ) -> None:  # fmt: skip
         self.form, self.record, self.names, have = form_of(model), record, tuple(names), len(model.craft.fins)
+        if not self.form.smooth:
+            raise InputError(
+                f"craft {model.craft.name}: its pilot shares a command among damaged fins by a search, which has no "
+                "slopes. Take derivatives of the sound craft, or set faults_known=False."
+            )
         compiled = library(self.form)
         if compiled is None:
             raise TowtankError(
@@ -311,6 +316,11 @@ class _Run:
         for i in [i for i, name in enumerate(self.names) if name == "psi"]:
             out[:, i] = np.unwrap([first, *out[:, i]])[1:]
         return out
+
+
+def _smooth(form: Form) -> Form:
+    """The form with the same parameters and rates that has slopes: how a pilot shares commands is no part of it."""
+    return replace(form, damaged=False)
 
 
 def _known(where: str, what: str, names: Sequence[str], able: Sequence[str]) -> Sequence[str]:
