@@ -46,7 +46,7 @@ def wide(tmp_path_factory):
 
 def load(target, folder):
     made = compile_library(c_text(form_of(model("lumped"))), target, folder / "library.so")
-    return loading._loaded(made, target)
+    return loading._loaded(made, target, True)
 
 
 @pytest.fixture

@@ -203,7 +203,7 @@ def _search(form: Form, able: tuple[Target, ...]) -> Found:
         path = build.SHIPPED_LIBRARIES / names[target]
         if _there(path):
             try:
-                return Found(_loaded(path, target), "shipped", bad, target)
+                return Found(_loaded(path, target, form.smooth), "shipped", bad, target)
             except (OSError, AttributeError) as error:
                 bad = bad or f"{path} cannot be loaded ({error}). Install towtank again"
     lacking = _lacking()
@@ -211,7 +211,7 @@ def _search(form: Form, able: tuple[Target, ...]) -> Found:
         path = cache_folder() / names[target]
         if _there(path):
             try:
-                return Found(_loaded(path, target), "cache", bad, target)
+                return Found(_loaded(path, target, form.smooth), "cache", bad, target)
             except (OSError, AttributeError) as error:
                 return Found(why=f"{path} cannot be loaded ({error}). Remove it, so that it is compiled again")
         if not lacking:
@@ -229,7 +229,8 @@ def _compiled(form: Form, able: tuple[Target, ...]) -> Found:
         for target in able:
             path = cache_folder() / _name(form, target)
             try:
-                found = Found(_loaded(path if _there(path) else compile_library(texts, target, path), target), "cache")
+                made = path if _there(path) else compile_library(texts, target, path)
+                found = Found(_loaded(made, target, form.smooth), "cache")
             except (TowtankError, OSError, AttributeError) as error:
                 why = why or _bare(str(error))
                 continue
@@ -281,8 +282,8 @@ def _there(path: Path) -> bool:
 
 
 @functools.cache
-def _loaded(path: Path, target: Target) -> Library:
-    """Load a library.
+def _loaded(path: Path, target: Target, smooth: bool) -> Library:
+    """Load a library, of a form that is ``smooth`` or not.
 
     Raises
     ------
@@ -294,11 +295,12 @@ def _loaded(path: Path, target: Target) -> Library:
     for name in ("run_one", "run_pack"):
         getattr(handle, name).restype = _INTEGER
         getattr(handle, name).argtypes = [ctypes.POINTER(Task)]
-    for name in ("misfit", "tangents"):
+    for name in ("misfit", "tangents") if smooth else ():
         getattr(handle, name).restype = ctypes.c_int
         getattr(handle, name).argtypes = [ctypes.POINTER(Slope)]
-    handle.jacobians.restype = None
-    handle.jacobians.argtypes = [_INTEGER, _REALS, _INTEGER, *[_REALS] * 6]
+    if smooth:
+        handle.jacobians.restype = None
+        handle.jacobians.argtypes = [_INTEGER, _REALS, _INTEGER, *[_REALS] * 6]
     return Library(path, target, handle)
 
 
