@@ -13,7 +13,7 @@ from towtank.cli.app import app
 
 runner = CliRunner()
 CRAFT = "hokie"
-STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "verdict", "report")
+STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "faults", "verdict", "report")
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from towtank.cli.check import check
 from towtank.cli.check_coefficients import check_coefficients
 from towtank.cli.derive import derive
 from towtank.cli.doctor import doctor
+from towtank.cli.faults import faults
 from towtank.cli.grid import grid
 from towtank.cli.imports import import_
 from towtank.cli.mc import mc
@@ -65,6 +66,7 @@ for _command in (
     derive,
     trial,
     mc,
+    faults,
     assess,
     sweep,
     report,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from towtank.tank.tank import Tank
     from towtank.trials.trajectory import Trajectory
 
-STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "verdict", "report")
+STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "faults", "verdict", "report")
 
 
 def open_chain(reply: Reply, craft: str | None, out: Path | None, speed: str | None = None) -> Chain:
@@ -112,7 +112,7 @@ class Chain:
                 return craft | {"plan": file_hash(study.plan)} | towing.inputs(self)
             case "derive":
                 return craft | {"runs": files.get("tow", "")} | fitting.inputs(self)
-            case "trials":
+            case "trials" | "faults":
                 return craft | {"derivatives": file_hash(study.derivatives)}
             case "mc":
                 return craft | {"derivatives": file_hash(study.derivatives)} | asked(self)
@@ -121,7 +121,7 @@ class Chain:
                 flown = self.study.stages().get("trials", {}).get("files", {})
                 flown = {name: known for name, known in flown.items() if name.endswith(".nc")}
                 return craft | {"derivatives": file_hash(study.derivatives), "trials": digest(flown, 16)}
-        known = ("plan", "tow", "derive", "trials", "mc", "verdict")
+        known = ("plan", "tow", "derive", "trials", "mc", "faults", "verdict")
         return craft | {name: files.get(name, "") for name in known}
 
     def done(self, stage: str) -> bool:

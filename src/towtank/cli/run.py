@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from towtank.cli import budget, towing
 from towtank.cli.chain import open_chain
+from towtank.cli.faults import jam
 from towtank.cli.options import Debug, Json, Out, Speed, StudyArgument
 from towtank.cli.reply import answering
 from towtank.cli.scatter import compiled, scatter
@@ -64,6 +65,8 @@ def run(
             scatter(chain)
         else:
             reply.log(f"mc       left out: {UNCOMPILED}")
+        if chain.craft.fins and (chain.done("faults") or compiled(chain)):
+            jam(chain)
         chain.judge()
         chain.publish()
         verdict = chain.verdict()

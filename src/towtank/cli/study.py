@@ -84,6 +84,11 @@ class Study:
         return self.root / "mc.json"
 
     @property
+    def faults(self) -> Path:
+        """The mission with jammed fins."""
+        return self.root / "faults.json"
+
+    @property
     def verdict(self) -> Path:
         """The verdict."""
         return self.root / "verdict.json"

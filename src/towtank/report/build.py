@@ -14,7 +14,18 @@ from towtank.artefact import write_text
 from towtank.figures.paper import level_words
 from towtank.parallel import each
 from towtank.provenance import VERSION
-from towtank.report import of_craft, of_fit, of_grid, of_model, of_montecarlo, of_tests, of_trials, of_trust, of_verdict
+from towtank.report import (
+    of_craft,
+    of_fit,
+    of_grid,
+    of_jammed,
+    of_model,
+    of_montecarlo,
+    of_tests,
+    of_trials,
+    of_trust,
+    of_verdict,
+)
 from towtank.report.blocks import Section, View
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import Study, gather, read_study
@@ -29,6 +40,7 @@ SECTIONS: tuple[Callable[[Study, Sketchbook], Section], ...] = (
     of_fit.fit,
     of_trials.trials,
     of_montecarlo.uncertainty,
+    of_jammed.faults,
     of_verdict.verdict,
     of_verdict.validation,
     of_trust.sensitivity,
@@ -49,8 +61,8 @@ def report(path: str | Path, *things: Any, title: str = "") -> Path:
     Parameters
     ----------
     path : file to be written.
-    things : Craft, Plan, Run, GridStudy, Derivatives, FrequencyStudy, Model, Trajectory, MonteCarlo, Verdict, or
-        sequences of them, in any order. A stage that is not given is named in the page.
+    things : Craft, Plan, Run, GridStudy, Derivatives, FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins,
+        Verdict, or sequences of them, in any order. A stage that is not given is named in the page.
     title : of the page; the craft's own when left out.
 
     Returns

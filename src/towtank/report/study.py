@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from towtank.derive.study import FrequencyStudy
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
+    from towtank.trials.jammed import JammedFins
     from towtank.verdict.table import Verdict
 
 STAGES = {
@@ -32,6 +33,7 @@ STAGES = {
     "frequency": "Pass the FrequencyStudy, or run `towtank derive` on runs that oscillate.",
     "trials": "Pass trajectories, or run `towtank trial`.",
     "mc": "Pass the MonteCarlo, or run `towtank mc`.",
+    "faults": "Pass the JammedFins, or run `towtank faults`.",
     "verdict": "Pass the Verdict, or run `towtank assess`.",
     "grid": "Pass the GridStudy, or run `towtank grid`.",
     "validation": "Run `make validate`, which compares the fast tank with published tests.",
@@ -56,6 +58,7 @@ class Study:
     model: Model | None = None
     trajectories: tuple[Trajectory, ...] = ()
     mc: MonteCarlo | None = None
+    jammed: JammedFins | None = None
     verdict: Verdict | None = None
     index: Mapping[str, Any] = field(default_factory=dict)
     grid: GridStudy | None = None
@@ -165,14 +168,21 @@ def _part(thing: Any) -> str:
     from towtank.derive.study import FrequencyStudy
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
+    from towtank.trials.jammed import JammedFins
     from towtank.verdict.table import Verdict
 
-    for of, name in ((FrequencyStudy, "frequency"), (Model, "model"), (MonteCarlo, "mc"), (Verdict, "verdict")):
+    for of, name in (
+        (FrequencyStudy, "frequency"),
+        (Model, "model"),
+        (MonteCarlo, "mc"),
+        (JammedFins, "jammed"),
+        (Verdict, "verdict"),
+    ):
         if isinstance(thing, of):
             return name
     raise InputError(
         f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, GridStudy, Derivatives, "
-        "FrequencyStudy, Model, Trajectory, MonteCarlo, Verdict, or sequences of them."
+        "FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins, Verdict, or sequences of them."
     )
 
 
@@ -211,6 +221,7 @@ def read_study(folder: Path | str) -> Study:
     from towtank.grid.files import read_grid
     from towtank.montecarlo.files import read_mc
     from towtank.plan.files import read_plan
+    from towtank.trials.jammed_files import read_jammed
     from towtank.verdict.files import read_verdict
 
     files = {name: root / name for name in ("craft.toml", "plan.toml", "runs", "derivatives.json", "trials")}
@@ -226,6 +237,7 @@ def read_study(folder: Path | str) -> Study:
         frequency=attempt("frequency", root / "frequency.json", lambda: read_frequencies(root / "frequency.json")),
         trajectories=attempt("trials", files["trials"], lambda: _trajectories(files["trials"]), ()),
         mc=attempt("mc", root / "mc.json", lambda: read_mc(root)),
+        jammed=attempt("faults", root / "faults.json", lambda: read_jammed(root / "faults.json")),
         verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
         index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
         grid=attempt("grid", root / "grid.json", lambda: read_grid(root / "grid.json")),
