@@ -17,6 +17,7 @@ def sentences(v: Verdict) -> str:
         _vertical(v),
         _level(v),
         _pilot(v.requirements, v.comparison),
+        _asked(v),
         _limits(v),
     ]
     return "\n\n".join(p for p in paragraphs if p)
@@ -108,6 +109,39 @@ def _pilot(requirements: Sequence[Requirement], comparison: Sequence[Comparison]
     if travel is not None:
         parts.append(f"the fins travel {travel.closed:.2f} deg per metre")
     return "; ".join(parts) + "."
+
+
+def _asked(v: Verdict) -> str:
+    """How many requirements are met, which are not, and what decides them."""
+    asked = [r for r in v.requirements if r.sense]
+    if not asked:
+        return ""
+    missed = [r for r in asked if not r.met]
+    text = f"Of {len(asked)} requirements {len(asked) - len(missed) or 'none'} " + (
+        "are met." if len(asked) - len(missed) != 1 else "is met."
+    )
+    if missed:
+        text += f" Not met: {'; '.join(_missed(r) for r in missed)}."
+    if np.isfinite(v.together):
+        text += f" All that are put to single craft are met together with a probability of {100.0 * v.together:.0f} %."
+    return text
+
+
+def _missed(r: Requirement) -> str:
+    if not np.isfinite(r.value):
+        return f"{r.name}, which has no number here"
+    value = f"{r.value:.3g} {r.unit}".strip()
+    bar = (
+        ""
+        if r.wanted is None
+        else f" with a probability of {100.0 * r.wanted:.0f} %, and has {_percent(r.probability)}"
+    )
+    driver = f", driven by {r.drivers[0].coefficient}" if r.drivers else ""
+    return f"{r.name} ({value}, {r.sense} {r.limit:.3g}{bar}{driver})"
+
+
+def _percent(probability: float) -> str:
+    return f"{100.0 * probability:.0f} %" if np.isfinite(probability) else "none"
 
 
 def _limits(v: Verdict) -> str:
