@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -94,26 +95,52 @@ def fly_piece(study: Study, piece: Piece) -> dict[str, Any]:
     KeyboardInterrupt
         The flights were stopped: nothing of the piece is kept.
     """
+    first = piece.number == 0
     drawn = draw(study.model, piece.count, study.given, study.seed, piece.number, study.root)
-    stable = {name: packed(values) for name, values in stability(study.model, drawn.columns).items()}
-    out: dict[str, Any] = {"trials": {}, "stability": stable, "bands": {}}
+    stable = stability(study.model, drawn.columns)
+    order = side_by_side(stable["horizontal_index"], first)
+    sorted_ = Many(study.model, {name: values[order] for name, values in drawn.columns.items()})
     task = f"piece {piece.number + 1}"
     study.told.start(task, len(study.trials))
-    for model, trial in study.trials:
-        flights = fly_drawn(model, trial, drawn, record(model, trial, piece.number == 0))
-        away: NDArray[np.bool_] = np.isin(flights.ended, RAN_AWAY)
-        read = sound_readings(model, trial, flights)
-        out["trials"][trial.name] = {
-            "kind": trial.kind,
-            "loop": trial.loop,
-            "indices": {name: {"unit": unit, "values": packed(values)} for name, (values, unit) in read.items()},
-            "ended": packed(flights.ended, "f4"),
-        }
-        if piece.number == 0:
-            out["bands"][trial.name] = bands(flights, away)
-        study.told.step(task, trial.name)
+    found: dict[str, Future[tuple[dict[str, Any], dict[str, Any] | None]]] = {}
+    # The numbers of a trial are read while the next one flies.
+    with ThreadPoolExecutor(1) as pool:
+        for model, trial in study.trials:
+            flights = fly_drawn(model, trial, sorted_, record(model, trial, first))
+            found[trial.name] = pool.submit(_read, model, trial, flights, np.argsort(order), first)
+            study.told.step(task, trial.name)
     study.told.done(task)
-    return out
+    read = {name: each.result() for name, each in found.items()}
+    return {
+        "trials": {name: numbers for name, (numbers, _) in read.items()},
+        "stability": {name: packed(values) for name, values in stable.items()},
+        "bands": {name: band for name, (_, band) in read.items() if band is not None},
+    }
+
+
+def side_by_side(index: Array, first: bool) -> NDArray[np.intp]:
+    """Order (n,) in which craft fly: by stability ``index`` (n,), where the ``first`` is the best estimate it stays.
+
+    Craft that are alike take alike long, and a pack of them flies until its last one is through.
+    """
+    order = np.argsort(index, kind="stable")
+    return np.concatenate([[0], order[order != 0]]) if first else order
+
+
+def _read(
+    model: Model, trial: Ready, flights: Flights, back: NDArray[np.intp], first: bool
+) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """Numbers of one trial in the order ``back`` of the draw, and its bands where they are those of the ``first``."""
+    numbers = {
+        "kind": trial.kind,
+        "loop": trial.loop,
+        "indices": {
+            name: {"unit": unit, "values": packed(values[back])}
+            for name, (values, unit) in sound_readings(model, trial, flights).items()
+        },
+        "ended": packed(flights.ended[back], "f4"),
+    }
+    return numbers, bands(flights, np.isin(flights.ended, RAN_AWAY), back) if first else None
 
 
 def record(model: Model, trial: Ready, first: bool) -> Log | bool:
@@ -144,8 +171,10 @@ def fly_drawn(model: Model, trial: Ready, drawn: Many, kept: Log | bool = True) 
     return flights
 
 
-def bands(flights: Flights, away: NDArray[np.bool_]) -> dict[str, Any]:
+def bands(flights: Flights, away: NDArray[np.bool_], back: NDArray[np.intp]) -> dict[str, Any]:
     """Quantiles over the drawn craft at every sample, the best estimate being the first craft.
+
+    ``back`` : place of each craft of the draw among the flights.
 
     "time" (S), "under_way" (S) share of the craft, "quantiles": channel -> (len(QUANTILES), S), "best": channel ->
     (S), "tracks": "x", "y" -> (up to TRACKS, S). S ends where less than ``UNDER_WAY`` fly. In single precision.
@@ -161,7 +190,7 @@ def bands(flights: Flights, away: NDArray[np.bool_]) -> dict[str, Any]:
         "under_way": packed(share[at_], "f4"),
         "quantiles": {name: packed(quantiles(values[1:]), "f4") for name, values in series.items()},
         "best": {name: packed(values[0], "f4") for name, values in series.items()},
-        "tracks": {name: packed(series[name][1 : TRACKS + 1], "f4") for name in ("x", "y")},
+        "tracks": {name: packed(series[name][back[1 : TRACKS + 1]], "f4") for name in ("x", "y")},
     }
 
 
