@@ -50,7 +50,7 @@ def assess(
             return
         chain = open_chain(reply, craft, out).keep_speed()
         if requirements is not None:
-            judging.take(chain, requirements)
+            chain.requirements = requirements
             judging.prepare(chain)
         chain.judge()
         judging.tell(chain)

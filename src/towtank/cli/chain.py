@@ -73,6 +73,7 @@ class Chain:
     fitting : what the user asked of the fit, as in ``cli.fitting.FITTING``; None: what the study has.
     towing : what the user asked of the tank, as in ``cli.towing.TOWING``; None: what the study has.
     jobs : runs under way at a time; None: as many as the tank makes use of.
+    requirements : file, or ``cli.judging.STANDARD``; None: what the study has.
     """
 
     study: Study
@@ -84,6 +85,7 @@ class Chain:
     fitting: dict[str, str] | None = None
     towing: dict[str, str] | None = None
     jobs: int | None = None
+    requirements: str | None = None
     wall: dict[str, float] = field(default_factory=dict)
     _runs: tuple[Run, ...] | None = None
     _told: dict[str, dict[str, Any]] = field(default_factory=dict)

@@ -25,32 +25,41 @@ def inputs(chain: Chain) -> dict[str, str]:
     from towtank.montecarlo.craft import FILE
 
     drawn = file_hash(chain.study.root / FILE) if chain.done("mc") else ""
-    return {"drawn": drawn, "requirements": file_hash(chain.study.requirements)}
+    source = asked(chain)
+    return {"drawn": drawn, "requirements": file_hash(source) if source else ""}
 
 
-def take(chain: Chain, requirements: str) -> None:
-    """Put the user's ``requirements`` into the study, or take them out again for the standard set.
+def asked(chain: Chain) -> Path | None:
+    """The file of requirements: given now, or kept in the study; None for the standard set."""
+    if chain.requirements is not None:
+        return None if chain.requirements == STANDARD else Path(chain.requirements)
+    kept = chain.study.requirements
+    return kept if kept.exists() else None
+
+
+def _keep(chain: Chain) -> None:
+    """Put the requirements that were given now, and could be judged, into the study."""
+    from towtank.artefact import write_text
+
+    own, source = chain.study.requirements, asked(chain)
+    if source is None:
+        own.unlink(missing_ok=True)
+    elif not own.exists() or not own.samefile(source):
+        write_text(own, source.read_text(encoding="utf-8"))
+
+
+def prepare(chain: Chain) -> None:
+    """The trials that requirements are put to, flown by the best estimate and by drawn craft.
 
     Raises
     ------
     InputError
-        They cannot be used; nothing of the study has changed then.
+        The file of requirements cannot be used.
     """
-    from towtank.artefact import write_text
     from towtank.verdict.needs import read_requirements
 
-    own = chain.study.requirements
-    if requirements == STANDARD:
-        own.unlink(missing_ok=True)
-        return
-    given = Path(requirements)
-    read_requirements(given)
-    if not own.exists() or not own.samefile(given):
-        write_text(own, given.read_text(encoding="utf-8"))
-
-
-def prepare(chain: Chain) -> None:
-    """The trials that requirements are put to, flown by the best estimate and by drawn craft."""
+    if source := asked(chain):
+        read_requirements(source)
     chain.try_out()
     if chain.done("mc") or compiled(chain):
         scatter(chain)
@@ -59,16 +68,17 @@ def prepare(chain: Chain) -> None:
 
 
 def judge(chain: Chain) -> Sequence[Path]:
-    """Write the verdict."""
+    """Write the verdict. The requirements of the study change only when those given now could be judged."""
     from towtank.montecarlo.craft import read_population
     from towtank.verdict.assess import assess
     from towtank.verdict.files import write_verdict
     from towtank.verdict.needs import read_requirements
 
-    study, model = chain.study, chain.model()
-    needs = read_requirements(study.requirements) if study.requirements.exists() else None
+    study, model, source = chain.study, chain.model(), asked(chain)
+    needs = read_requirements(source) if source else None
     population = read_population(study.root, model) if chain.done("mc") else None
     found = assess(model, chain.trajectories(), needs, population)
+    _keep(chain)
     write_verdict(found, chain.replacing(study.verdict))
     return (study.verdict,)
 
@@ -99,6 +109,8 @@ def lines(found: Verdict) -> list[str]:
         )
     if asked:
         out += ["", f"P: share of {found.drawn} that meets it. Driven by: change of the number for 1 % more of it."]
+    if any(math.isnan(r.probability) and not r.on_share for r in asked):
+        out.append("No P (-): no drawn craft has made the trial. `towtank mc` flies the standard ones.")
     if math.isfinite(found.together):
         out.append(f"All that are put to single craft, together: {_percent(found.together)}.")
     return out

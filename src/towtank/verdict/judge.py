@@ -100,7 +100,7 @@ def _on_share(need: Need, evidence: Evidence) -> Requirement:
         need.name, share, "", limit, bool(sign * share >= sign * limit), note, need.sense.replace("_", " "),
         margin=sign * (share - limit), std=math.sqrt(share * (1.0 - share) / of),
         drivers=drivers(evidence.steps, evidence.probability_effect(measure), evidence.steps.share(wide=False)),
-        source=need.source, assumed=need.assumed,
+        source=need.source, assumed=need.assumed, on_share=True,
     )  # fmt: skip
 
 

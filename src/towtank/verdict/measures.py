@@ -158,7 +158,7 @@ MEASURES: Mapping[str, Measure] = {
     "loop_width": Measure("deg", "width of the instability loop, in rudder", partial(_loop, part=0), True),
     "loop_height": Measure("deg/s", "height of the instability loop, in yaw rate", partial(_loop, part=1), True),
     "metacentric_height": Measure("m", "BG, centre of gravity below the centre of buoyancy", metacentric_height),
-    "righting_moment": Measure("N*m/deg", "righting moment in roll and in pitch", lambda c: np.radians(stiffness(c))),
+    "righting_moment": Measure("N m/deg", "righting moment in roll and in pitch", lambda c: np.radians(stiffness(c))),
     "roll_period": Measure("s", "period of free roll at rest", partial(swing_period, axis=3)),
     "pitch_period": Measure("s", "period of free pitch at rest", partial(swing_period, axis=4)),
     "munk_speed": Measure("m/s", "speed above which incidence outweighs the righting moment", munk_speed),

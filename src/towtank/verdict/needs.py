@@ -117,7 +117,7 @@ def read_requirements(path: Path | str) -> tuple[Need, ...]:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"requirements {path} cannot be read ({error}). `towtank assess --requirements template` prints one."
+            f"requirements {path} cannot be read ({error}). `towtank assess --template > mine.toml` writes one to edit."
         ) from None
     return requirements_of(text, path.name)
 

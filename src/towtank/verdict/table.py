@@ -34,6 +34,7 @@ class Requirement:
     inside.   std : standard uncertainty of the value.   probability : that a craft within the uncertainty meets it;
     NaN where it is not known.   wanted : the probability asked for, or None where the best estimate decides.
     drivers : strongest first.   source : of the limit.   assumed : the limit is somebody's choice.
+    on_share : the value is itself a share of the drawn craft, and ``std`` that of the sampling.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Requirement:
     drivers: tuple[Driver, ...] = ()
     source: str = ""
     assumed: bool = False
+    on_share: bool = False
 
     @property
     def margin_in_std(self) -> float:
