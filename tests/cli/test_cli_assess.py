@@ -61,7 +61,8 @@ def test_requirements_are_judged_with_margin_probability_and_driver(judged: tupl
     assert turns["limit"] == pytest.approx(5.0 * 8.15, rel=1e-3)
     assert turns["margin"] == pytest.approx(turns["limit"] - turns["value"])
     assert turns["met"] == (turns["probability"] >= 0.5)
-    assert {d["coefficient"] for d in turns["drivers"]} & {"Nuv", "Nur", "Nrr", "Nuudr"}
+    # hokie is four-fold: the pitch twin of each yaw derivative moves with it.
+    assert {d["coefficient"] for d in turns["drivers"]} & {"Nuv/Muw", "Nur/Muq"}
     mc = json.loads((folder / "mc.json").read_text())["stability"]["horizontal"]
     assert stable["value"] == mc["probability_stable"]
     document = json.loads((folder / "verdict.json").read_text())

@@ -16,14 +16,16 @@ from towtank.engine.start import at
 from towtank.model.equations import STATE, Model
 from towtank.model.linear import elevator_reversal_speed, linearise
 from towtank.pilot.orders import Orders
+from towtank.symbols import FOURFOLD_TIES
 from towtank.trials.circle import turning_circle
 from towtank.trials.steady import steady_turns
 from towtank.trials.straight import straight_run
 from towtank.verdict.criteria import growth, plane_criteria
 from towtank.verdict.fins import fin_use
-from towtank.verdict.many import Many, Population, drawn, stepped
+from towtank.verdict.many import Many, Population, drawn
 from towtank.verdict.measures import MEASURES, critical_speed, munk_speed, reversal_speed, swing_period
 from towtank.verdict.speeds import speed_sweep
+from towtank.verdict.steps import stepped
 from towtank.verdict.turns import many_turns
 
 
@@ -167,6 +169,26 @@ def test_a_step_of_one_slope_changes_the_index_by_its_derivative(vague: Model):
     # G is linear in Nuv.
     assert effect["Nuv"] == pytest.approx(slope * 0.1 * abs(d["Nuv"]), rel=1e-9)
     assert effect["Xuu"] == 0.0
+
+
+@pytest.mark.parametrize("std", [0.0, 0.1])
+def test_what_a_symmetry_ties_moves_together(std: float):
+    base = synthetic.model(synthetic.SUBOFF)
+    d = base.derivatives
+    # One standard uncertainty for both members of a tie, with the sign of the tie: a singular covariance.
+    root = np.zeros((len(d.names), len(d.names)))
+    for i, name in enumerate(d.names):
+        twin = FOURFOLD_TIES.get(name, (name, 1.0))[0]
+        root[i, d.names.index(twin)] = std * d.values[i]
+    model = replace(base, derivatives=replace(d, covariance_fit=root @ root.T))
+    steps = stepped(model)
+    assert "Nuv/Muw" in steps.names
+    assert len(steps.names) == len(set(d.names) - set(FOURFOLD_TIES) - {n for n in d.names if d[n] == 0.0})
+    for name, (twin, sign) in FOURFOLD_TIES.items():
+        if name in d.names:
+            np.testing.assert_allclose(steps.craft.columns[name], sign * steps.craft.columns[twin], rtol=1e-12)
+    expected = 0.05 if std == 0.0 else std
+    np.testing.assert_allclose(np.abs(steps.share()), expected, rtol=1e-9)
 
 
 def test_eigenvalues_against_speed_are_those_of_the_linear_model(vague: Model):

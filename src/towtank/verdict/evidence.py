@@ -17,9 +17,10 @@ from towtank.trials.ready import Readings, Ready
 from towtank.trials.standard import CLOSED_LOOP, OPEN_LOOP, standard_ready
 from towtank.trials.trajectory import Trajectory
 from towtank.verdict.flights import fly_many, sound_readings
-from towtank.verdict.many import Many, Population, Steps, same_craft, stepped
+from towtank.verdict.many import Many, Population, same_craft
 from towtank.verdict.measures import MEASURES
 from towtank.verdict.needs import Need
+from towtank.verdict.steps import Steps, stepped
 
 TRIED = 4
 """Coefficients whose effect on a probability is worked out: those that move the growth rate most."""
@@ -151,15 +152,18 @@ class Evidence:
         measure of the best estimate most.
         """
         effect = np.abs(self.steps.effect(self.measure(measure, moved=True)))
-        out, columns = np.zeros(len(effect)), self.population.craft.columns
+        out = np.zeros(len(effect))
         for i in np.argsort(-np.nan_to_num(effect))[:TRIED]:
-            name, size = self.steps.names[i], float(self.steps.size[i])
-            up, down = (
-                MEASURES[measure].of(Many(self.model, {**columns, name: columns[name] + way * size}))[1:] < 0.0
-                for way in (1.0, -1.0)
-            )
+            up, down = (MEASURES[measure].of(self._moved(i, way))[1:] < 0.0 for way in (1.0, -1.0))
             out[i] = 0.5 * (float(up.mean()) - float(down.mean()))
         return out
+
+    def _moved(self, i: int, way: float) -> Many:
+        """The population with all its craft moved by step i, up or down."""
+        craft, best = self.population.craft, self.steps.craft.columns
+        known = {name: craft.columns.get(name, np.full(len(craft), best[name][0])) for name in self.steps.moves[i]}
+        shifted = {name: known[name] + way * step for name, step in self.steps.moves[i].items()}
+        return Many(self.model, {**craft.columns, **shifted})
 
 
 def _plain(name: str) -> str:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from towtank.frames import Array
 from towtank.verdict.evidence import Evidence, Numbers
-from towtank.verdict.many import Steps
 from towtank.verdict.measures import SHARES
 from towtank.verdict.needs import Need
 from towtank.verdict.spread import spread_of, wilson
+from towtank.verdict.steps import Steps
 from towtank.verdict.table import Driver, Requirement
 
 NAMED = 3

@@ -1,4 +1,4 @@
-"""Craft side by side that differ from one model in derivatives, mass or CG: drawn from its uncertainty, or stepped."""
+"""Craft side by side that differ from one model in derivatives, mass or CG, such as those that are drawn."""
 
 from __future__ import annotations
 
@@ -22,10 +22,6 @@ SAMPLES = 2000
 SEED = 20
 BODY = ("m", "xG", "yG", "zG")
 """Parameters of the rigid body that may differ."""
-SHARE = 0.05
-"""Step of a coefficient without a standard uncertainty, as a share of it."""
-HALVINGS = 8
-"""Times a step is halved that leaves no positive mass matrix; beyond, the coefficient is not stepped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,80 +86,6 @@ def drawn(model: Model, count: int = SAMPLES, seed: int = SEED) -> Population:
     spread = np.random.default_rng(seed).standard_normal((count, len(d.names))) @ root_of(d.covariance, d.values).T
     table = d.values + np.vstack([np.zeros(len(d.names)), spread])
     return Population(Many(model, {name: table[:, i] for i, name in enumerate(d.names)}))
-
-
-@dataclass(frozen=True)
-class Steps:
-    """The best estimate, then two craft for each of K coefficients: stepped up, stepped down.
-
-    craft : 1 + 2 K.   names (K) : of the coefficients.   size (K,) : of the steps, SI.   value (K,) : best estimate.
-    """
-
-    craft: Many
-    names: tuple[str, ...]
-    size: Array
-    value: Array
-
-    def share(self, wide: bool = True) -> Array:
-        """Steps up (K,) as shares of their coefficients, negative for a negative one; infinite for one that is zero.
-
-        Of the ``wide`` fit, or of the slope at the origin where there is one.
-        """
-        d = self.craft.model.derivatives
-        size, value = dict(zip(self.names, self.size, strict=True)), dict(zip(self.names, self.value, strict=True))
-        std = dict(zip(d.names, np.sqrt(np.maximum(np.diag(d.covariance), 0.0)), strict=True))
-        for name in [name for name in d.origin if name in size and not wide]:
-            size[name] *= d.origin_std.get(name, std[name]) / std[name] if std.get(name, 0.0) > 0.0 else 1.0
-            value[name] = d.origin[name]
-        return np.array([size[name] / value[name] if value[name] else np.inf for name in self.names])
-
-    def effect(self, values: Array) -> Array:
-        """Change (K,) of a number for one step up, from its ``values`` (1 + 2 K,): half of up less down.
-
-        One side alone counts where the other has no number; NaN where neither has.
-
-        Source     Central difference, so a secant over two steps.
-        """
-        best, up, down = values[0], values[1::2], values[2::2]
-        both, one = 0.5 * (up - down), np.where(np.isfinite(up), up - best, best - down)
-        return np.where(np.isfinite(up) & np.isfinite(down), both, one)
-
-
-def stepped(model: Model, population: Population | None = None) -> Steps:
-    """Every coefficient of ``model`` by itself moved up and down by one standard uncertainty, or by ``SHARE``.
-
-    Mass and CG are stepped where ``population`` draws them, by their standard deviation in it. A step that leaves no
-    positive mass matrix is halved until it does.
-
-    Departure  Correlations between coefficients are left out: each moves alone.
-    """
-    d = model.derivatives
-    std = np.sqrt(np.maximum(np.diag(d.covariance), 0.0))
-    size = {n: float(s if s > 0.0 else SHARE * abs(x)) for n, s, x in zip(d.names, std, d.values, strict=True)}
-    value = {**d.as_dict(), **{name: float(getattr(model.constants.body, name)) for name in BODY}}
-    for name, column in (population.craft.columns if population else {}).items():
-        if name in BODY and np.ptp(column[1:]) > 0.0:
-            size[name] = float(np.std(column[1:]))
-    size = {name: step for name, step in size.items() if step > 0.0}
-    for _ in range(HALVINGS):
-        craft = _side_by_side(model, value, size)
-        fine = sound(model, craft.columns)
-        bad = {name for i, name in enumerate(size) if not fine[1 + 2 * i : 3 + 2 * i].all()}
-        if not bad:
-            break
-        size = {name: 0.5 * step if name in bad else step for name, step in size.items()}
-    else:
-        size = {name: step for name, step in size.items() if name not in bad}
-        craft = _side_by_side(model, value, size)
-    return Steps(craft, tuple(size), np.array(list(size.values())), np.array([value[name] for name in size]))
-
-
-def _side_by_side(model: Model, value: Mapping[str, float], size: Mapping[str, float]) -> Many:
-    count = 1 + 2 * len(size)
-    columns = {name: np.full(count, value[name]) for name in {**dict.fromkeys(model.derivatives.names), **size}}
-    for i, (name, step) in enumerate(size.items()):
-        columns[name][1 + 2 * i : 3 + 2 * i] += np.array([step, -step])
-    return Many(model, columns)
 
 
 def lumped(model: Model, columns: Mapping[str, Array], slopes: str = "origin") -> dict[str, Array]:
