@@ -215,6 +215,7 @@ def test_the_drag_of_the_fins_is_the_term_of_the_model():
     # Rudder alone, four X fins: each at 10 deg; the lag of the start is 0.2 s of some minutes.
     assert use.settled == pytest.approx(100.0 * 10.0 / 25.0, rel=0.02)
     assert use.aileron == pytest.approx(15.0, abs=0.5)
+    assert use.roll == pytest.approx(trial.indices["largest_roll"][0], abs=0.05)  # of samples a 20th of a length apart
     at_rest = fin_use(model, straight_run(model))
     assert at_rest.drag == 0.0
     assert at_rest.aileron == pytest.approx(25.0)

@@ -98,13 +98,14 @@ def fins(it: Verdict) -> list[Block]:
         (
             use.trial, use.loop,
             *(number(x, 3) for x in (use.use, use.settled, use.saturated, use.aileron, use.travel)),
-            *(number(x, 3) for x in (use.drag, use.share, use.power)),
+            *(number(x, 3) for x in (use.drag, use.share, use.power, use.roll)),
         )
         for use in it.fins
     )  # fmt: skip
     head = (
         "Trial", "Loop", "Range used [%]", "settled [%]", "At a limit [% of time]", "Left for roll [deg]",
         "Travel [deg/m]", "Drag [N]", "of the hull's [%]", "Power [W]",
+        "Largest roll [deg]",
     )  # fmt: skip
     more = (
         "Range used: largest share of its limit that a fin reaches; settled and left for roll: mean of the last "

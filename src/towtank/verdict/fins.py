@@ -21,7 +21,8 @@ class FinUse:
     use : largest share of its limit that a fin reaches [%].   settled : the same in the trial's last quarter, mean.
     saturated : time with a fin at its limit [%].   aileron : deflection that every fin still has for roll in the last
     quarter, mean [deg].   travel [deg/m].   drag : of the deflected fins, mean over the trial [N], which is the energy
-    they cost for each metre.   share : of that drag in the resistance of the hull [%].   power [W].
+    they cost for each metre.   share : of that drag in the resistance of the hull [%].   power [W].   roll : largest
+    [deg].
     """
 
     trial: str
@@ -35,6 +36,7 @@ class FinUse:
     drag: float
     share: float
     power: float
+    roll: float
 
 
 def fin_use(model: Model, trial: Trajectory) -> FinUse:
@@ -61,6 +63,7 @@ def fin_use(model: Model, trial: Trajectory) -> FinUse:
         saturated=index.get("fin_saturation", np.nan), aileron=float(np.degrees(room[after].mean())),
         travel=index.get("fin_travel", np.nan), drag=power / speed,
         share=100.0 * power / _mean(trial.time, -hull * ahead), power=power,
+        roll=float(np.degrees(np.abs(trial.attitude[:, 0]).max())),
     )  # fmt: skip
 
 
