@@ -11,7 +11,7 @@ OUT    ?= hokie
 ENGINE := hatch_build.py $(wildcard src/towtank/symbols.py src/towtank/engine/*.py src/towtank/engine/c/* \
             src/towtank/model/*.py src/towtank/pilot/*.py)
 
-.PHONY: help install openfoam run test lint bench bench-engine bench-derive validate validate-slurm validate-openfoam clean
+.PHONY: help install openfoam run test lint bench bench-engine bench-derive bench-robust validate validate-slurm validate-openfoam clean
 .DEFAULT_GOAL := help
 
 help:
@@ -26,6 +26,7 @@ help:
 	@echo "make bench     time and memory of the whole chain, written to bench/run.json"
 	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
 	@echo "make bench-derive  identification of 200 runs of 2000 samples, written to bench/derive.json"
+	@echo "make bench-robust  1000 drawn craft through all trials and requirements, written to bench/robust.json"
 	@echo "make clean     remove $(VENV)/, caches and bench/"
 
 install: $(VENV)/.engine
@@ -83,6 +84,9 @@ bench-engine: $(VENV)/.engine $(VENV)/.tools
 
 bench-derive: $(VENV)/.engine
 	$(BIN)/python benchmarks/derive.py
+
+bench-robust: $(VENV)/.engine
+	$(BIN)/python benchmarks/robust.py
 
 clean:
 	rm -rf $(VENV) bench build dist src/towtank/engine/lib .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

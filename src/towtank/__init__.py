@@ -45,6 +45,7 @@ _PUBLIC = {
     "depth_step": "towtank.trials.steps",
     "lawnmower": "towtank.trials.mission",
     "assess": "towtank.verdict.assess",
+    "read_requirements": "towtank.verdict.needs",
     "monte_carlo": "towtank.montecarlo.study",
     "Tolerances": "towtank.montecarlo.draw",
     "vary": "towtank.sweep.vary",

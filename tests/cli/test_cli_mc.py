@@ -101,7 +101,8 @@ def test_the_trials_get_their_std_and_stay_done(flown: Path, tmp_path: Path):
     expected = next(trial for trial in stated if trial["name"] == "turning-15deg")["indices"]["advance"]["std"]
     assert _circle(folder)["advance"]["std"] == expected > 0.0
     stages = answer("status", "--out", str(folder))[0]["summary"]["stages"]
-    assert [stages[name] for name in ("trials", "mc", "verdict")] == ["done"] * 3
+    assert [stages[name] for name in ("trials", "mc")] == ["done"] * 2
+    assert stages["verdict"].startswith("out of date")  # its probabilities are those of the drawn craft
     # A further trial leaves the std of the others in place, and the chain keeps the craft that were asked for.
     assert runner.invoke(app, ["trial", "zigzag", "--angle", "15 deg", "--out", str(folder)]).exit_code == 0
     assert _circle(folder)["advance"]["std"] == expected

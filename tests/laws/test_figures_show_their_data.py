@@ -13,15 +13,35 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import synthetic_craft as synthetic
-from towtank.figures import coefficients, forces, frequency, histories, paper, poles, series, shape, tracks
+from towtank.figures import (
+    coefficients,
+    forces,
+    frequency,
+    histories,
+    paper,
+    poles,
+    requirements,
+    series,
+    shape,
+    tracks,
+)
 from towtank.trials.circle import turning_circle
 from towtank.trials.zigzag import zigzag
+from towtank.verdict.table import Driver, Requirement
 
 approx = pytest.approx
 SWEEP = poles.PoleSweep(
     "horizontal", "semi-empirical", np.array([0.5, 1.0, 1.5]),
     np.array([[-0.1 + 0.2j, -0.1 - 0.2j], [-0.2 + 0.4j, -0.2 - 0.4j], [-0.3 + 0.6j, -0.3 - 0.6j]]), {"G_h": 0.25},
 )  # fmt: skip
+
+
+ASKED = (
+    Requirement("turn", 30.0, "m", 40.0, True, "", "at most", 10.0, 5.0, 0.9, drivers=(Driver("Nuv", 2.0, 10.0, 0.2),)),
+    Requirement("swing", 12.0, "deg", 10.0, False, "", "at most", -2.0, 4.0, 0.3, 0.8),
+    Requirement("P", 0.6, "", 0.9, False, "", "at least", -0.3, 0.02, on_share=True),
+    Requirement("pilot stable", -0.1, "1/s", 0.0, True, ""),
+)
 
 
 def _run(name):
@@ -36,6 +56,7 @@ def words(ax: Axes) -> str:
     return " ".join(text.get_text().replace("\n", " ") for text in ax.texts)
 
 
+MODELLED = ("poles", "slowest mode", "index", "chances", "margins")
 FIGURES = {
     "loads": lambda: forces.load_against_angle(case.runs(), "Y", "drift", case.derivatives()),
     "residual": lambda: forces.residual_against_angle(case.runs(), case.derivatives(), "N"),
@@ -62,6 +83,8 @@ FIGURES = {
     "poles": lambda: poles.pole_map(SWEEP),
     "slowest mode": lambda: poles.real_parts([SWEEP]),
     "index": lambda: poles.stability_index("G_h", np.linspace(-1.0, 3.0, 401), 1.0, "semi-empirical"),
+    "chances": lambda: requirements.chances(ASKED, "semi-empirical", "60 samples"),
+    "margins": lambda: requirements.margins(ASKED, "semi-empirical", "60 samples"),
 }
 
 
@@ -72,10 +95,30 @@ def test_figure_states_units_level_and_uncertainty(name):
     assert isinstance(ax, Axes)
     label = ax.get_xlabel() + ax.get_ylabel()
     assert "[" in label or "x 1000" in label or "share" in label
-    level = paper.level_words("semi-empirical" if name in ("poles", "slowest mode", "index") else "known coefficients")
+    level = paper.level_words("semi-empirical" if name in MODELLED else "known coefficients")
     assert level in words(ax)
     assert any(word in words(ax) for word in ("std", "band", "uncertainty", "samples", "ensemble", "members"))
     assert dict(mpl.rcParams) == before  # no global style
+
+
+def test_requirements_show_their_share_and_margin_in_the_colour_of_the_result():
+    ax = requirements.chances(ASKED, "semi-empirical", "60 samples")
+    bars = [(bar.get_width(), bar.get_facecolor()[:3]) for bar in ax.patches]
+    assert [width for width, _ in bars] == approx([90.0, 30.0, 60.0])
+    assert bars[1][1] == bars[2][1] != bars[0][1]
+    assert [line.get_xdata()[0] for line in ax.lines] == approx([80.0, 90.0])  # what is asked for
+    ax = requirements.margins(ASKED, "semi-empirical", "60 samples")
+    assert [bar.get_width() for bar in ax.patches] == approx([2.0, -0.5])
+    assert "Nuv" in words(ax)
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["turn", "swing"]
+
+
+def test_the_slowest_mode_shows_the_band_of_the_drawn_craft():
+    banded = replace(SWEEP, band=np.array([[-0.2, -0.3, -0.4], [0.0, -0.1, -0.2]]))
+    ax = poles.real_parts([banded])
+    assert ax.collections[0].get_paths()[0].vertices[:, 1].min() == approx(-0.4)
+    assert "5 to 95 %" in words(ax)
+    assert not poles.real_parts([SWEEP]).collections
 
 
 def test_the_semi_empirical_level_is_spelled_out():
@@ -86,7 +129,7 @@ def test_the_semi_empirical_level_is_spelled_out():
 def test_every_public_figure_takes_axes_and_gives_them_back():
     own = Figure().add_subplot()
     assert forces.load_against_angle(case.runs(), ax=own) is own
-    for module in (forces, series, frequency, coefficients, tracks, histories, poles, shape):
+    for module in (forces, series, frequency, coefficients, tracks, histories, poles, requirements, shape):
         for name, function in inspect.getmembers(module, inspect.isfunction):
             public = function.__module__ == module.__name__ and not name.startswith("_")
             if public and name not in ("sweep", "residuals", "levels"):

@@ -18,11 +18,11 @@ from towtank.errors import InputError, TowtankError
 from towtank.figures.montecarlo import channel_fan
 from towtank.model.equations import Model
 from towtank.montecarlo import study as study_module
+from towtank.montecarlo.craft import read_population
 from towtank.montecarlo.draw import Tolerances, draw, tolerances
 from towtank.montecarlo.files import read_mc, std_of, write_mc, write_std
-from towtank.montecarlo.fly import Piece, Study, fly_drawn, fly_piece, gathered, pieces, quantiles
+from towtank.montecarlo.fly import Piece, Study, fly_drawn, fly_piece, gathered, pieces
 from towtank.montecarlo.result import MonteCarlo
-from towtank.montecarlo.spread import spread_of, wilson
 from towtank.montecarlo.study import monte_carlo, study_of
 from towtank.plan.standard import standard_plan
 from towtank.progress import Silent
@@ -39,6 +39,7 @@ from towtank.trials.start import ballasted
 from towtank.trials.straight import straight_ready
 from towtank.trials.zigzag import zigzag_ready
 from towtank.verdict.criteria import plane_criteria
+from towtank.verdict.spread import quantiles, spread_of, wilson
 
 
 @pytest.fixture(scope="module")
@@ -268,8 +269,15 @@ def test_an_interruption_keeps_the_finished_pieces(hokie: Model, monkeypatch: py
 def test_files_come_back_and_the_index_of_the_trials_gets_its_uncertainty(hokie: Model, tmp_path: Path):
     found = monte_carlo(hokie, 40, trials=circle)
     names = [path.name for path in write_mc(found, tmp_path)]
-    assert names == ["mc.json", "turning-15deg.nc"]
+    assert names == ["mc.json", "turning-15deg.nc", "population.nc"]
     back = read_mc(tmp_path)
+    craft = read_population(tmp_path, hokie)
+    for name, column in found.population.craft.columns.items():
+        if np.ptp(column) > 0.0:
+            np.testing.assert_array_equal(craft.craft.columns[name], column)
+    for name, (numbers, unit) in found.population.trials["turning-15deg"].indices.items():
+        np.testing.assert_array_equal(craft.trials["turning-15deg"].indices[name][0], numbers)
+        assert craft.trials["turning-15deg"].indices[name][1] == unit
     assert values(back) == values(found)
     assert str(back) == str(found)
     for channel, rows in found.bands["turning-15deg"].quantiles.items():

@@ -114,6 +114,17 @@ def test_the_verdict_of_an_unstable_craft(unstable, tmp_path):
     assert read_verdict(path) == verdict
 
 
+def test_the_speed_at_which_the_vertical_plane_is_lost_is_told(unstable):
+    verdict = assess(unstable)
+    limit = next(c for c in verdict.criteria if c.name == "critical_speed")
+    assert verdict.vertical.stable == (limit.value > 1.0)
+    assert (f"Above {limit.value:.2f} m/s it is unstable" in verdict.words) == verdict.vertical.stable
+    slower = replace(unstable, craft=replace(unstable.craft, speed=0.5 * limit.value))
+    faster = replace(unstable, craft=replace(unstable.craft, speed=2.0 * limit.value))
+    assert assess(slower).vertical.stable
+    assert not assess(faster).vertical.stable
+
+
 def test_the_verdict_of_a_stable_craft(stable):
     verdict = assess(stable)
     assert verdict.horizontal.stable

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from towtank.cli import fitting, towing
+from towtank.cli import fitting, judging, towing
 from towtank.cli.reply import Remarks, Reply
 from towtank.cli.scatter import asked, spread
 from towtank.cli.study import Study, file_hash, program_hash
@@ -73,6 +73,7 @@ class Chain:
     fitting : what the user asked of the fit, as in ``cli.fitting.FITTING``; None: what the study has.
     towing : what the user asked of the tank, as in ``cli.towing.TOWING``; None: what the study has.
     jobs : runs under way at a time; None: as many as the tank makes use of.
+    requirements : file, or ``cli.judging.STANDARD``; None: what the study has.
     """
 
     study: Study
@@ -84,6 +85,7 @@ class Chain:
     fitting: dict[str, str] | None = None
     towing: dict[str, str] | None = None
     jobs: int | None = None
+    requirements: str | None = None
     wall: dict[str, float] = field(default_factory=dict)
     _runs: tuple[Run, ...] | None = None
     _told: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -120,7 +122,8 @@ class Chain:
                 # The index of the trials holds what the verdict does not use: the spread of the indices.
                 flown = self.study.stages().get("trials", {}).get("files", {})
                 flown = {name: known for name, known in flown.items() if name.endswith(".nc")}
-                return craft | {"derivatives": file_hash(study.derivatives), "trials": digest(flown, 16)}
+                flown_by = {"derivatives": file_hash(study.derivatives), "trials": digest(flown, 16)}
+                return craft | flown_by | judging.inputs(self)
         known = ("plan", "tow", "derive", "trials", "mc", "faults", "verdict")
         return craft | {name: files.get(name, "") for name in known}
 
@@ -302,15 +305,8 @@ class Chain:
 
     def judge(self) -> None:
         """The verdict."""
-        self.do("verdict", self._judge)
+        self.do("verdict", lambda: judging.judge(self))
         self.reply.file("verdict", self.study.verdict)
-
-    def _judge(self) -> Sequence[Path]:
-        from towtank.verdict.assess import assess
-        from towtank.verdict.files import write_verdict
-
-        write_verdict(assess(self.model(), self.trajectories()), self.replacing(self.study.verdict))
-        return (self.study.verdict,)
 
     def verdict(self) -> dict[str, Any]:
         """What the verdict of the study says: level, speed, both planes, elevator reversal, words."""

@@ -94,6 +94,11 @@ class Study:
         return self.root / "verdict.json"
 
     @property
+    def requirements(self) -> Path:
+        """What the user asks of the craft; absent for the standard set."""
+        return self.root / "requirements.toml"
+
+    @property
     def report(self) -> Path:
         """The report."""
         return self.root / "report.html"

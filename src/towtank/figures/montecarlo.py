@@ -8,8 +8,8 @@ import numpy as np
 
 from towtank.figures.paper import BAND, FIT, GREY, INK, ORIGIN, frame, head, legend, new_axes
 from towtank.frames import Array
-from towtank.montecarlo.fly import QUANTILES
 from towtank.montecarlo.result import MonteCarlo
+from towtank.verdict.spread import QUANTILES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,6 +21,7 @@ class PoleSweep:
 
     plane : "horizontal" or "vertical".   level : of the derivatives behind.   speed (n,) [m/s];
     eigenvalues (n, k) complex [1/s].   indices : words -> stability index, such as "G_h, slope at the origin".
+    band (2, n) : 5 and 95 % of the largest real part over drawn craft [1/s], or None.
     """
 
     plane: str
@@ -28,6 +29,7 @@ class PoleSweep:
     speed: Array
     eigenvalues: np.ndarray[tuple[int, int], np.dtype[np.complex128]]
     indices: Mapping[str, float] = field(default_factory=dict)
+    band: Array | None = None
 
 
 def pole_map(sweep: PoleSweep, ax: Axes | None = None) -> Axes:
@@ -55,6 +57,8 @@ def real_parts(sweeps: Sequence[PoleSweep], ax: Axes | None = None) -> Axes:
     """Largest real part of the eigenvalues [1/s] of each plane against speed [m/s]; above zero is unstable."""
     ax = new_axes(ax, width=4.2, height=2.8)
     for colour, sweep in zip((FIT, ORIGIN), sweeps, strict=False):
+        if sweep.band is not None:
+            ax.fill_between(sweep.speed, *sweep.band, color=colour, alpha=0.18, linewidth=0)
         ax.plot(
             sweep.speed,
             sweep.eigenvalues.real.max(axis=1),
@@ -69,7 +73,9 @@ def real_parts(sweeps: Sequence[PoleSweep], ax: Axes | None = None) -> Axes:
     ax.axhspan(0.0, max(high, 1e-6), color="#f6dfd8", alpha=0.5, linewidth=0)
     ax.set_ylim(low, max(high, 0.1 * abs(low)))
     level = sweeps[0].level if sweeps else ""
-    head(ax, "Slowest mode against speed", level, "nominal coefficients, no band")
+    banded = any(sweep.band is not None for sweep in sweeps)
+    words = "lines: best estimate; bands: 5 to 95 % of drawn craft" if banded else "nominal coefficients, no band"
+    head(ax, "Slowest mode against speed", level, words)
     legend(ax)
     return ax
 

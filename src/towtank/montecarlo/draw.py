@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from towtank.derive.covariance import root_of
 from towtank.errors import InputError
 from towtank.frames import Array, rotation
 from towtank.model.equations import Model
 from towtank.model.kinematics import attitude_of
-from towtank.model.rigid_body import Body, mass_matrix
 from towtank.quantity import Quantity, si
-from towtank.symbols import LOADS, RATES
+from towtank.verdict.many import Many, sound
 
 CG = ("xG", "yG", "zG")
 CURRENT = ("current_north", "current_east")
@@ -76,19 +73,9 @@ def tolerances(mass: Quantity = 0.0, cg: Quantity = 0.0, current: Quantity = 0.0
     return Tolerances(share, (each, each, each), si(current, "m/s", "current tolerance"))
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """N craft: parameter name -> (N,), as the engine names them."""
-
-    columns: Mapping[str, Array]
-
-    def __len__(self) -> int:
-        return len(next(iter(self.columns.values())))
-
-
 def draw(
     model: Model, count: int, given: Tolerances = NONE, seed: int = 0, piece: int = 0, root: Array | None = None
-) -> Drawn:
+) -> Many:
     """``count`` craft of piece ``piece``; the same numbers whoever draws them, wherever and in whatever order.
 
     The first piece holds the best estimate before its ``count`` craft.
@@ -107,7 +94,7 @@ def draw(
         raise InputError(f"Monte Carlo: {count} samples. Ask for one or more.")
     factor = root_of(model.derivatives.covariance, model.derivatives.values) if root is None else root
     columns = _once(model, count, given, factor, (seed, piece))
-    bad = ~_sound(model, columns)
+    bad = ~sound(model, columns)
     if bad.mean() > MOST_LOST and count >= 10:
         raise InputError(
             f"Monte Carlo of {model.craft.name}: {100.0 * bad.mean():.0f} % of the drawn craft have no positive mass "
@@ -119,7 +106,7 @@ def draw(
             break
         others = _once(model, count, given, factor, (seed, piece, again))
         columns = {name: np.where(bad, others[name], values) for name, values in columns.items()}
-        bad = ~_sound(model, columns)
+        bad = ~sound(model, columns)
     else:
         raise InputError(
             f"Monte Carlo of {model.craft.name}: no craft with a positive mass matrix was drawn in {TRIES} tries. "
@@ -128,7 +115,7 @@ def draw(
     if piece == 0:
         best = _best(model)
         columns = {name: np.concatenate([[best.get(name, 0.0)], values]) for name, values in columns.items()}
-    return Drawn(columns)
+    return Many(model, columns)
 
 
 def _best(model: Model) -> dict[str, float]:
@@ -146,28 +133,6 @@ def _once(model: Model, count: int, given: Tolerances, root: Array, stream: tupl
     columns["m"] = best["m"] * (1.0 + given.mass * weight)
     columns |= {name: best[name] + given.cg[i] * place[i] for i, name in enumerate(CG)}
     return columns | {name: given.current * water[i] for i, name in enumerate(CURRENT)}
-
-
-def _sound(model: Model, columns: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """True (N,) where the mass matrix M_RB - M_A is positive definite."""
-    count = len(columns["m"])
-    M = np.stack(
-        [
-            np.stack([np.broadcast_to(a, (count,)) for a in row], axis=-1)
-            for row in mass_matrix(body_of(model, columns))
-        ],
-        axis=1,
-    )
-    for i, load in enumerate(LOADS):
-        for j, rate in enumerate(RATES):
-            M[:, i, j] -= columns.get(f"{load}{rate}dot", 0.0)
-    return np.asarray(np.linalg.eigvalsh(0.5 * (M + M.transpose(0, 2, 1)))[:, 0] > 0.0)
-
-
-def body_of(model: Model, columns: Mapping[str, Array]) -> Body:
-    """The rigid body with drawn mass and CG: entries (N,) among floats."""
-    drawn: dict[str, Any] = {name: columns[name] for name in ("m", *CG)}
-    return replace(model.constants.body, **drawn)
 
 
 def starts(start: Array, columns: Mapping[str, Array]) -> Array:

@@ -12,11 +12,12 @@ import numpy as np
 
 from towtank.artefact import Variable, read_json, read_netcdf, write_json, write_netcdf
 from towtank.errors import ArtefactError
+from towtank.montecarlo.craft import write_population
 from towtank.montecarlo.draw import Tolerances
-from towtank.montecarlo.fly import BAND_CHANNELS, QUANTILES
+from towtank.montecarlo.fly import BAND_CHANNELS
 from towtank.montecarlo.result import Bands, MonteCarlo, PlaneSpread, TrialSpread
-from towtank.montecarlo.spread import Spread
 from towtank.trials.files import INDEX_SCHEMA
+from towtank.verdict.spread import QUANTILES, Spread
 
 SCHEMA, BANDS_SCHEMA = "towtank/mc/1", "towtank/bands/1"
 FOLDER, DOCUMENT = "mc", "mc.json"
@@ -27,7 +28,7 @@ _UNITS |= dict.fromkeys(("u", "v", "w", "speed"), "m/s") | {"r": "rad/s"}
 
 
 def write_mc(it: MonteCarlo, folder: Path | str) -> tuple[Path, ...]:
-    """Write ``mc.json`` and ``mc/<trial>.nc`` for every trial with bands; the files, the document first.
+    """Write ``mc.json``, ``mc/<trial>.nc`` for every trial with bands, ``mc/population.nc``; the document comes first.
 
     Raises
     ------
@@ -53,6 +54,8 @@ def write_mc(it: MonteCarlo, folder: Path | str) -> tuple[Path, ...]:
     attrs = {"craft": it.craft, "level": it.level, "samples": it.done, "provenance": dict(it.provenance)}
     for name, bands in it.bands.items():
         paths.append(write_bands(name, bands, folder / FOLDER / f"{name}.nc", attrs))
+    if it.population is not None:
+        paths.append(write_population(it.population, folder, attrs))
     return tuple(paths)
 
 
@@ -126,7 +129,7 @@ def read_bands(path: Path | str) -> Bands:
 
 
 def read_mc(folder: Path | str) -> MonteCarlo:
-    """Read what ``write_mc`` wrote into ``folder``.
+    """Read what ``write_mc`` wrote into ``folder``; the craft themselves are read by ``read_population``.
 
     Raises
     ------

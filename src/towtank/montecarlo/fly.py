@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,26 +14,26 @@ from numpy.typing import NDArray
 from towtank.engine.clock import clock_of
 from towtank.engine.flights import Flights
 from towtank.engine.plan import Ended, Log
-from towtank.engine.run import Ensemble
 from towtank.engine.start import at
 from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.montecarlo.draw import CURRENT, Drawn, Tolerances, draw, starts
+from towtank.montecarlo.draw import CURRENT, Tolerances, draw, starts
 from towtank.montecarlo.packed import packed, unpacked
-from towtank.montecarlo.stable import neutral, stability
+from towtank.montecarlo.stable import stability
 from towtank.progress import Progress, Silent
-from towtank.trials.ready import Ready, fly_ready, readings
+from towtank.trials.ready import Ready
+from towtank.verdict.flights import RAN_AWAY, fly_many, sound_readings
+from towtank.verdict.many import Many
+from towtank.verdict.spread import quantiles
 
 BAND_CHANNELS = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "r", "rudder", "elevator", "speed")
 """Channels whose bands are kept over time, where the first piece of a study is flown."""
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 UNDER_WAY = 0.9
 """Share of the craft that must still fly for a band to be stated; later it would be one of the slow craft only."""
 LOGGED, KEPT = 1200, 300
 """Samples over the longest time a trial may take, and of a band."""
 TRACKS = 40
 """Craft of the first piece whose tracks are kept."""
-RAN_AWAY = (Ended.NOT_FINITE, Ended.TOO_FAST)
 
 Trials = Sequence[tuple[Model, Ready]]
 Recipe = Callable[[Model], Trials]
@@ -94,30 +95,52 @@ def fly_piece(study: Study, piece: Piece) -> dict[str, Any]:
     KeyboardInterrupt
         The flights were stopped: nothing of the piece is kept.
     """
+    first = piece.number == 0
     drawn = draw(study.model, piece.count, study.given, study.seed, piece.number, study.root)
-    stable = {name: packed(values) for name, values in stability(study.model, drawn.columns).items()}
-    out: dict[str, Any] = {"trials": {}, "stability": stable, "bands": {}}
+    stable = stability(study.model, drawn.columns)
+    order = side_by_side(stable["horizontal_index"], first)
+    sorted_ = Many(study.model, {name: values[order] for name, values in drawn.columns.items()})
     task = f"piece {piece.number + 1}"
     study.told.start(task, len(study.trials))
-    for model, trial in study.trials:
-        flights = fly_drawn(model, trial, drawn, record(model, trial, piece.number == 0))
-        away: NDArray[np.bool_] = np.isin(flights.ended, RAN_AWAY)
-        read = readings(model, trial, flights)
-        out["trials"][trial.name] = {
-            "kind": trial.kind,
-            "loop": trial.loop,
-            # A craft that ran away left the range of its derivatives: none of its numbers count.
-            "indices": {
-                name: {"unit": unit, "values": packed(np.where(away, np.nan, values))}
-                for name, (values, unit) in read.items()
-            },
-            "ended": packed(flights.ended, "f4"),
-        }
-        if piece.number == 0:
-            out["bands"][trial.name] = bands(flights, away)
-        study.told.step(task, trial.name)
+    found: dict[str, Future[tuple[dict[str, Any], dict[str, Any] | None]]] = {}
+    # The numbers of a trial are read while the next one flies.
+    with ThreadPoolExecutor(1) as pool:
+        for model, trial in study.trials:
+            flights = fly_drawn(model, trial, sorted_, record(model, trial, first))
+            found[trial.name] = pool.submit(_read, model, trial, flights, np.argsort(order), first)
+            study.told.step(task, trial.name)
     study.told.done(task)
-    return out
+    read = {name: each.result() for name, each in found.items()}
+    return {
+        "trials": {name: numbers for name, (numbers, _) in read.items()},
+        "stability": {name: packed(values) for name, values in stable.items()},
+        "bands": {name: band for name, (_, band) in read.items() if band is not None},
+    }
+
+
+def side_by_side(index: Array, first: bool) -> NDArray[np.intp]:
+    """Order (n,) in which craft fly: by stability ``index`` (n,), where the ``first`` is the best estimate it stays.
+
+    Craft that are alike take alike long, and a pack of them flies until its last one is through.
+    """
+    order = np.argsort(index, kind="stable")
+    return np.concatenate([[0], order[order != 0]]) if first else order
+
+
+def _read(
+    model: Model, trial: Ready, flights: Flights, back: NDArray[np.intp], first: bool
+) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """Numbers of one trial in the order ``back`` of the draw, and its bands where they are those of the ``first``."""
+    numbers = {
+        "kind": trial.kind,
+        "loop": trial.loop,
+        "indices": {
+            name: {"unit": unit, "values": packed(values[back])}
+            for name, (values, unit) in sound_readings(model, trial, flights).items()
+        },
+        "ended": packed(flights.ended[back], "f4"),
+    }
+    return numbers, bands(flights, np.isin(flights.ended, RAN_AWAY), back) if first else None
 
 
 def record(model: Model, trial: Ready, first: bool) -> Log | bool:
@@ -130,34 +153,28 @@ def record(model: Model, trial: Ready, first: bool) -> Log | bool:
     return Log(BAND_CHANNELS, max(own, math.ceil(longest / clock.tick / LOGGED))) if first else False
 
 
-def fly_drawn(model: Model, trial: Ready, drawn: Drawn, kept: Log | bool = True) -> Flights:
+def fly_drawn(model: Model, trial: Ready, drawn: Many, kept: Log | bool = True) -> Flights:
     """``trial`` flown by the ``drawn`` craft, all under the pilot, the trim and the thrust of the best estimate.
-
-    A model that was ballasted to neutral stays so: its displaced mass goes with its mass.
-
-    Valid      Inertia about the origin stays that of the best estimate when mass or CG are drawn.
 
     Raises
     ------
     KeyboardInterrupt
         Interrupted before every craft was through.
     """
-    columns = dict(drawn.columns)
-    if neutral(model):
-        columns["b"] = columns["m"]
-    for i, name in enumerate(CURRENT):
-        columns[name] = columns[name] + trial.current[i]
+    columns = {name: drawn.columns[name] + trial.current[i] for i, name in enumerate(CURRENT)}
     start = at(trial.setting.state if trial.start is None else trial.start, trial.setting.memory)
     # The trial's own current is in its start already.
     begin = starts(start, drawn.columns)
-    flights = fly_ready(model, trial, Ensemble(len(drawn), columns, begin), record=kept)
+    flights = fly_many(model, trial, Many(model, {**drawn.columns, **columns}), kept, begin)
     if np.any(flights.ended == Ended.STOPPED):
         raise KeyboardInterrupt
     return flights
 
 
-def bands(flights: Flights, away: NDArray[np.bool_]) -> dict[str, Any]:
+def bands(flights: Flights, away: NDArray[np.bool_], back: NDArray[np.intp]) -> dict[str, Any]:
     """Quantiles over the drawn craft at every sample, the best estimate being the first craft.
+
+    ``back`` : place of each craft of the draw among the flights.
 
     "time" (S), "under_way" (S) share of the craft, "quantiles": channel -> (len(QUANTILES), S), "best": channel ->
     (S), "tracks": "x", "y" -> (up to TRACKS, S). S ends where less than ``UNDER_WAY`` fly. In single precision.
@@ -173,25 +190,8 @@ def bands(flights: Flights, away: NDArray[np.bool_]) -> dict[str, Any]:
         "under_way": packed(share[at_], "f4"),
         "quantiles": {name: packed(quantiles(values[1:]), "f4") for name, values in series.items()},
         "best": {name: packed(values[0], "f4") for name, values in series.items()},
-        "tracks": {name: packed(series[name][1 : TRACKS + 1], "f4") for name in ("x", "y")},
+        "tracks": {name: packed(series[name][back[1 : TRACKS + 1]], "f4") for name in ("x", "y")},
     }
-
-
-def quantiles(values: Array, at_: Sequence[float] = QUANTILES) -> Array:
-    """Quantiles (len(at_), ...) over the first axis, of what is not NaN; NaN where nothing is.
-
-    Source     Linear between the order statistics, as numpy's default.
-    """
-    ordered = np.sort(values, axis=0)
-    count = np.count_nonzero(~np.isnan(values), axis=0)
-    out = []
-    for q in at_:
-        place = q * np.maximum(count - 1, 0)
-        low = np.floor(place).astype(np.int64)
-        high = np.minimum(low + 1, np.maximum(count - 1, 0))
-        a, b = (np.take_along_axis(ordered, i[None], axis=0)[0] for i in (low, high))
-        out.append(np.where(count > 0, a + (place - low) * (b - a), np.nan))
-    return np.array(out)
 
 
 def pieces(samples: int, size: int) -> Sequence[Piece]:

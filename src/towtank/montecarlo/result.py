@@ -9,7 +9,8 @@ from typing import Any
 
 from towtank.frames import Array
 from towtank.montecarlo.draw import Tolerances
-from towtank.montecarlo.spread import Spread
+from towtank.verdict.many import Population
+from towtank.verdict.spread import Spread
 
 SMALLEST = {"m": 0.05, "deg": 0.2, "deg/s": 0.02, "s": 0.1, "%": 0.5, "1/s": 1e-3, "m/s": 0.01, "": 0.02}
 """Half the 5-95 % band below which an index is not among the widest, however small its value."""
@@ -71,7 +72,8 @@ class MonteCarlo:
     """A craft's trials under the uncertainty of its derivatives and the ``given`` tolerances.
 
     level : of the derivatives.   samples : drawn craft asked for; done : flown. The best estimate is beside them.
-    bands : trial -> of the first piece's craft.
+    bands : trial -> of the first piece's craft.   population : the first 5000 craft themselves with their indices;
+    None where they were not kept.
     """
 
     craft: str
@@ -83,6 +85,7 @@ class MonteCarlo:
     trials: Mapping[str, TrialSpread]
     planes: Mapping[str, PlaneSpread]
     bands: Mapping[str, Bands] = field(default_factory=dict)
+    population: Population | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property

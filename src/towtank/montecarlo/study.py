@@ -25,12 +25,14 @@ from towtank.montecarlo.fly import (
     pieces,
 )
 from towtank.montecarlo.packed import unpacked
+from towtank.montecarlo.ranks import RANKED, Ranks
 from towtank.montecarlo.result import Bands, MonteCarlo, PlaneSpread, TrialSpread
-from towtank.montecarlo.spread import RANKED, Ranks, Spread, spread_of, wilson
 from towtank.montecarlo.stable import PLANES
 from towtank.progress import Progress, Silent
 from towtank.provenance import VERSION, digest, provenance
 from towtank.trials.ready import Ready
+from towtank.verdict.many import Many, Population, TrialValues
+from towtank.verdict.spread import Spread, spread_of, wilson
 
 SAMPLES, SIZE, SEED = 1000, 500, 20
 MOST = 10_000_000
@@ -181,7 +183,8 @@ def summed_up(
 ) -> MonteCarlo:
     """The pieces as one result. The bands are those of the first piece, the drivers those of the first 5000 craft."""
     whole, d = gathered(answers), study.model.derivatives
-    ranks = Ranks(_drawn(study, parts))
+    columns = _drawn(study, parts)
+    ranks = Ranks({name: values[1:] for name, values in columns.items()})
     return MonteCarlo(
         craft=study.model.craft.name,
         level=d.level,
@@ -192,12 +195,13 @@ def summed_up(
         trials={name: _trial(name, trial, ranks) for name, trial in whole["trials"].items()},
         planes={plane: _plane(plane, whole["stability"], ranks) for plane in PLANES},
         bands={name: _bands(entry) for name, entry in whole["bands"].items()},
+        population=_population(study, columns, whole["trials"]),
         provenance=provenance({"model": digest(_identity(study.model), 16)}, key=study.key, size=size, source=program),
     )
 
 
 def _drawn(study: Study, parts: Sequence[Piece]) -> dict[str, Array]:
-    """The drawn parameters again, name -> (N,), as far as they are ranked."""
+    """The parameters again, name -> (1 + N,), best estimate first, as far as they are ranked."""
     found: dict[str, list[Array]] = {}
     count = 0
     for part in parts:
@@ -205,9 +209,21 @@ def _drawn(study: Study, parts: Sequence[Piece]) -> dict[str, Array]:
             break
         drawn = draw(study.model, part.count, study.given, study.seed, part.number, study.root)
         for name, values in drawn.columns.items():
-            found.setdefault(name, []).append(values[1:] if part.number == 0 else values)
+            found.setdefault(name, []).append(values)
         count += part.count
-    return {name: np.concatenate(values) for name, values in found.items()}
+    return {name: np.concatenate(values)[: RANKED + 1] for name, values in found.items()}
+
+
+def _population(study: Study, columns: Mapping[str, Array], trials: Mapping[str, Any]) -> Population:
+    """The craft whose parameters are at hand, with the numbers of their trials."""
+    craft = Many(study.model, columns)
+    values = {
+        name: TrialValues(
+            trial["kind"], trial["loop"], {key: (x[: len(craft)], unit) for key, (x, unit) in trial["indices"].items()}
+        )
+        for name, trial in trials.items()
+    }
+    return Population(craft, values, str(study.given))
 
 
 def _trial(name: str, trial: Mapping[str, Any], ranks: Ranks) -> TrialSpread:

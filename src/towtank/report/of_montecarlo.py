@@ -6,10 +6,10 @@ from functools import partial
 
 from towtank.figures import montecarlo
 from towtank.montecarlo.result import MonteCarlo, driven
-from towtank.montecarlo.spread import Spread
 from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated
 from towtank.report.pictures import Sketchbook
 from towtank.report.study import STAGES, Study
+from towtank.verdict.spread import Spread
 
 TITLE = "Uncertainty of the manoeuvres"
 

@@ -11,6 +11,7 @@ import numpy as np
 from towtank.errors import TowtankError
 from towtank.figures import poles
 from towtank.figures.paper import level_words
+from towtank.report import of_requirements
 from towtank.report.blocks import Block, Section, Table, Text, missing, number, stated, with_std
 from towtank.report.of_trials import headline, remarks
 from towtank.report.pictures import Sketchbook
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 PLANES = ("horizontal", "vertical")
 SYMBOL = {"horizontal": "G_h", "vertical": "G_v"}
-SPEEDS = (0.5, 1.5, 11)
-"""Range of the pole map as shares of the reference speed, and number of speeds."""
 
 
 def summary(study: Study, book: Sketchbook) -> Section:
@@ -79,9 +78,10 @@ def verdict(study: Study, book: Sketchbook) -> Section:
     """Words, criteria, requirements, open against closed loop, and the poles against speed."""
     blocks: list[Block] = []
     if it := study.verdict:
-        blocks += [*_judgement(it), _planes(it), _requirements(it)]
+        blocks += [*_judgement(it), _planes(it), *of_requirements.criteria(it), *of_requirements.asked(it, book)]
         if it.comparison:
             blocks.append(_comparison(it))
+        blocks += of_requirements.fins(it)
         if it.effectiveness:
             blocks.append(_effectiveness(it))
     else:
@@ -107,22 +107,15 @@ def _planes(it: Verdict) -> Table:
         ]
     if it.elevator_reversal_speed is not None:
         rows.append(("vertical", "elevator reversal speed [m/s]", number(it.elevator_reversal_speed, 3)))
-    words = "std and range from samples of the derivatives' covariance; the probability is the share of stable samples"
+    words = (
+        f"std and range over {it.drawn or 'samples of the derivatives'}; the probability is the share that is stable"
+    )
     more = f"At {number(it.speed)} m/s. G above zero: straight-line stability with fins held"
     return Table("Stability", ("Plane", "Quantity", "Value"), tuple(rows), stated(it.level, words, more=more))
 
 
 def _complex(value: complex) -> str:
     return number(value.real, 3) if abs(value.imag) < 1e-9 else f"{number(value.real, 3)} {value.imag:+.3g}i"
-
-
-def _requirements(it: Verdict) -> Table:
-    rows = tuple(
-        (r.name, number(r.value), number(r.limit), r.unit, "met" if r.met else "not met", r.note)
-        for r in it.requirements
-    )
-    head = ("Requirement", "Value", "Limit", "Unit", "Result", "Remark")
-    return Table("Requirements", head, rows, stated(it.level, "in the remark, where it was found"))
 
 
 def _comparison(it: Verdict) -> Table:
@@ -144,7 +137,7 @@ def _pole_maps(study: Study, book: Sketchbook) -> list[Block]:
         return [missing("No pole map: there is no model.", "It needs the craft and its derivatives.")]
     slopes = "origin" if study.model.derivatives.origin else "wide"
     try:
-        sweeps = [_sweep(study.model, plane, slopes) for plane in PLANES]
+        sweeps = _sweeps(study.model, study.verdict, slopes)
         calls = [*(partial(poles.pole_map, sweep) for sweep in sweeps), partial(poles.real_parts, sweeps)]
     except (TowtankError, np.linalg.LinAlgError) as error:
         return [Text(f"The poles against speed could not be found: {error}", "bad")]
@@ -160,18 +153,26 @@ def _pole_maps(study: Study, book: Sketchbook) -> list[Block]:
 _SLOPES = {"origin": "slopes at the origin", "wide": "wide fit"}
 
 
-def _sweep(model: Model, plane: str, slopes: str) -> poles.PoleSweep:
+def _sweeps(model: Model, judged: Verdict | None, slopes: str) -> list[poles.PoleSweep]:
+    """Both planes against speed: those of the verdict, or of craft drawn here for a report without one."""
     from towtank.model import linear
+    from towtank.verdict.many import drawn
+    from towtank.verdict.speeds import speed_sweep
 
-    low, high, count = SPEEDS
-    speeds = model.craft.speed * np.linspace(low, high, count)
-    states = ("v", "r") if plane == "horizontal" else ("w", "q", "theta")
-    linearise = linear.horizontal if plane == "horizontal" else linear.vertical
-    eigenvalues = np.array([np.linalg.eigvals(linearise(model, float(s), slopes, states).A) for s in speeds])
+    found = judged.against_speed if judged and judged.against_speed else speed_sweep(drawn(model).craft)
     kinds = ("wide", "origin") if slopes == "origin" else ("wide",)
-    found = {kind: getattr(linear.stability_indices(model, kind), plane) for kind in kinds}
-    indices = {f"{SYMBOL[plane]}, {_SLOPES[kind]}": float(value) for kind, value in found.items()}
-    return poles.PoleSweep(plane, model.derivatives.level, speeds, eigenvalues, indices)
+    out = []
+    for plane in PLANES:
+        of = found.planes[plane]
+        values = {kind: getattr(linear.stability_indices(model, kind), plane) for kind in kinds}
+        indices = {f"{SYMBOL[plane]}, {_SLOPES[kind]}": float(value) for kind, value in values.items()}
+        out.append(
+            poles.PoleSweep(
+                plane, model.derivatives.level, np.array(found.speed), np.array(of.eigenvalues), indices,
+                np.array([of.low, of.high]),
+            )
+        )  # fmt: skip
+    return out
 
 
 def _index_figure(model: Model, plane: str, slopes: str, ax: Axes | None = None) -> Axes:

@@ -80,7 +80,7 @@ def evaluate(craft: Craft, tank: FastTank | None = None, trials: Sequence[str] =
             if trial is not None:
                 made[name] = trial
                 notes += [note for note in trial.provenance.get("notes", []) if note.startswith("Not trimmed")]
-    return Evaluated(model, made, assess(model, tuple(made.values())), tuple(dict.fromkeys(notes)))
+    return Evaluated(model, made, assess(model, tuple(made.values()), requirements=()), tuple(dict.fromkeys(notes)))
 
 
 @lru_cache(maxsize=8)

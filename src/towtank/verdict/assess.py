@@ -11,51 +11,82 @@ from towtank.errors import TowtankError
 from towtank.model.equations import Model
 from towtank.model.linear import elevator_reversal_speed, linearise
 from towtank.pilot.design import design_pilot, elevator_authority
+from towtank.pilot.law import Pilot
 from towtank.provenance import provenance
-from towtank.trials.start import ballasted, level_trim, slowest_level_speed
+from towtank.trials.circle import circle_ready
+from towtank.trials.ready import Ready, run_trial
+from towtank.trials.start import ballasted, fin_limit, level_trim, slowest_level_speed
 from towtank.trials.trajectory import Trajectory
-from towtank.verdict.criteria import SAMPLES, PlaneCriteria, index, plane_criteria, samples
-from towtank.verdict.table import Comparison, Requirement, Verdict
+from towtank.verdict.compare import comparison, notes
+from towtank.verdict.criteria import index, plane_criteria, samples
+from towtank.verdict.evidence import Evidence
+from towtank.verdict.fins import FinUse, fin_use
+from towtank.verdict.judge import judge
+from towtank.verdict.many import Population, drawn
+from towtank.verdict.measures import MEASURES
+from towtank.verdict.needs import Need, standard_requirements
+from towtank.verdict.speeds import speed_sweep
+from towtank.verdict.spread import nearest_quantiles
+from towtank.verdict.table import Criterion, Requirement, Verdict
 from towtank.verdict.words import sentences
 
 __all__ = ["Verdict", "assess"]
 
 
-def assess(model: Model, trajectories: Sequence[Trajectory] = ()) -> Verdict:
-    """Stability of both planes, what the fins can do, and what the pilot gains and costs, at the craft's speed.
+def assess(
+    model: Model,
+    trajectories: Sequence[Trajectory] = (),
+    requirements: Sequence[Need] | None = None,
+    population: Population | None = None,
+    ready: Sequence[tuple[Model, Ready]] | None = None,
+) -> Verdict:
+    """Stability of both planes, what the fins can do, what the pilot gains and costs, and what is met, at the speed.
 
     Parameters
     ----------
     trajectories : trials of this craft, for the comparison of open with closed loop; may be empty.
+    requirements : from ``read_requirements``; the standard set when left out, as far as there are numbers for it. An
+        empty sequence leaves out all that takes time: requirements, criteria, eigenvalues against speed, use of fins.
+    population : the drawn craft, ``monte_carlo(model).population``. When left out, craft are drawn from the uncertainty
+        of the derivatives; they fly nothing, so that requirements on trials get no probability.
+    ready : the trials, ready to fly, for what drives their indices; the standard set when left out.
 
     Raises
     ------
     TowtankError
-        A trajectory is of another craft.
+        A trajectory or the population is of another craft.
+    InputError
+        A requirement that cannot be put to this craft.
     """
     foreign = [t.name for t in trajectories if t.craft != model.craft.name]
     if foreign:
         raise TowtankError(
             f"assess {model.craft.name}: trial {foreign[0]} is of another craft. Give trials of this craft only."
         )
-    speed = model.craft.speed
-    slopes = "origin" if model.derivatives.origin else "wide"
-    horizontal = plane_criteria(model, "horizontal", speed)
-    vertical = plane_criteria(model, "vertical", speed)
-    reversal = elevator_reversal_speed(model, slopes)
+    speed, population = model.craft.speed, population or drawn(model)
+    needs = standard_requirements() if requirements is None else requirements
+    evidence = Evidence(model, population, trajectories, ready)
+    pilot, checks = _checks(model, speed)
+    judged, together = judge(needs, evidence)
+    fins = _fins(model, trajectories, pilot) if needs else ()
     verdict = Verdict(
         craft=model.craft.name,
         level=model.derivatives.level,
         speed=speed,
-        horizontal=horizontal,
-        vertical=vertical,
-        elevator_reversal_speed=reversal,
+        horizontal=plane_criteria(model, "horizontal", speed, population),
+        vertical=plane_criteria(model, "vertical", speed, population),
+        elevator_reversal_speed=elevator_reversal_speed(model, population.craft.slopes),
         effectiveness=effectiveness(model, speed),
-        requirements=_requirements(model, speed, horizontal, vertical, reversal),
-        comparison=comparison(trajectories),
+        requirements=(*judged, *checks),
+        comparison=comparison(trajectories, fins),
         dominant=dominant_terms(model),
-        notes=_notes(trajectories),
-        provenance=provenance(trials=[t.name for t in trajectories], samples=SAMPLES),
+        notes=notes(trajectories),
+        provenance=provenance(trials=[t.name for t in trajectories], samples=population.count),
+        criteria=_criteria(evidence) if needs else (),
+        against_speed=speed_sweep(population.craft) if needs else None,
+        fins=fins,
+        together=together,
+        drawn=f"{population.count} craft drawn from {population.words}",
     )
     return replace(verdict, words=sentences(verdict))
 
@@ -82,42 +113,19 @@ def effectiveness(model: Model, speed: float) -> dict[str, tuple[float, str]]:
     return out
 
 
-def comparison(trajectories: Sequence[Trajectory]) -> tuple[Comparison, ...]:
-    """Open- against closed-loop numbers of the trials at hand: course, overshoot, depth, effort of the fins."""
-    straight, zigzag = _first(trajectories, "straight run"), _first(trajectories, "zigzag, horizontal")
-    heading, mission = _first(trajectories, "heading step"), _first(trajectories, "lawnmower")
-    depth, survey = _first(trajectories, "depth step"), mission or heading
-    rows = []
-    if straight and heading:
-        rows.append(_row("course held", straight, "heading_change", heading, "last_error", "deg"))
-    if zigzag and heading:
-        rows.append(_row("overshoot", zigzag, "first_overshoot", heading, "overshoot", "deg"))
-    if straight and depth:
-        rows.append(_row("depth held", straight, "depth_change", depth, "last_error", "m"))
-    if survey:
-        base = zigzag or straight
-        for name, key, unit in (
-            ("fin effort", "fin_rms", "deg"),
-            ("fin travel", "fin_travel", "deg/m"),
-            ("fin saturation", "fin_saturation", "%"),
-        ):
-            rows.append(_row(name, base, key, survey, key, unit))
-    return tuple(rows)
-
-
 def dominant_terms(model: Model, count: int = 2) -> tuple[tuple[str, float], ...]:
     """The derivatives whose own uncertainty spreads the horizontal index most, with their share of its variance.
 
     Source     First-order sum of squares: each term moved by one standard uncertainty, correlations left out.
     """
     slopes = "origin" if model.derivatives.origin else "wide"
-    drawn = samples(model, slopes=slopes)
-    best = {name: values[:1] for name, values in drawn.items()}
+    varied = samples(model, slopes=slopes)
+    best = {name: values[:1] for name, values in varied.items()}
     centre = float(index(model, best, "horizontal")[0])
     effect = {}
     for name in ("Yuv", "Nuv", "Yur", "Nur"):
-        if name in drawn:
-            moved = {**best, name: best[name] + float(np.std(drawn[name][1:]))}
+        if name in varied:
+            moved = {**best, name: best[name] + float(np.std(varied[name][1:]))}
             effect[name] = (float(index(model, moved, "horizontal")[0]) - centre) ** 2
     total = sum(effect.values())
     if not np.isfinite(total) or total <= 0.0:
@@ -126,55 +134,44 @@ def dominant_terms(model: Model, count: int = 2) -> tuple[tuple[str, float], ...
     return tuple((name, share / total) for name, share in ranked[:count])
 
 
-def _requirements(
-    model: Model, speed: float, horizontal: PlaneCriteria, vertical: PlaneCriteria, reversal: float | None
-) -> tuple[Requirement, ...]:
-    out = [
-        Requirement(
-            f"{c.plane} plane stable, fins fixed", max(s.real for s in c.eigenvalues), "1/s", 0.0, c.stable,
-            f"probability {100.0 * c.probability:.0f} % within the uncertainty of the derivatives",
-        )
-        for c in (horizontal, vertical)
-    ]  # fmt: skip
+def _criteria(evidence: Evidence) -> tuple[Criterion, ...]:
+    """Every measure that this craft has, with its interval over the drawn craft."""
+    out = []
+    for name, of in MEASURES.items():
+        values = evidence.measure(name)
+        if not np.isnan(values).all():
+            low, high = nearest_quantiles(values[1:])
+            out.append(Criterion(name, float(values[0]), of.unit, low, high, of.words))
+    return tuple(out)
+
+
+def _fins(model: Model, trajectories: Sequence[Trajectory], pilot: Pilot | None) -> tuple[FinUse, ...]:
+    """Use of the fins in each trial, and in a circle at the largest rudder; none without trials or fins."""
+    if not trajectories or not model.craft.fins:
+        return ()
+    flown = list(trajectories)
+    hardest = model if level_trim(model, model.craft.speed).holds else ballasted(model)
+    circle = circle_ready(hardest, fin_limit(model), hold_depth=pilot is not None, pilot=pilot)
+    if circle.name not in {t.name for t in flown}:
+        flown.append(run_trial(hardest, circle))
+    return tuple(fin_use(model, trial) for trial in flown)
+
+
+def _checks(model: Model, speed: float) -> tuple[Pilot | None, tuple[Requirement, ...]]:
+    """The pilot, if one can be designed, and what any craft with fins has to do before a limit means something."""
     if not model.craft.fins:
-        return tuple(out)
-    if reversal is not None:
-        out.append(
-            Requirement(
-                "speed above elevator reversal", speed / reversal, "", 1.1, speed > 1.1 * reversal,
-                "a margin of 10 % for the speed lost in a turn",
-            )
-        )  # fmt: skip
+        return None, ()
     trim = level_trim(model, speed)
     slowest = None if trim.holds else slowest_level_speed(model)
     remedy = "" if trim.holds else (
         f"; it can from {slowest:.2f} m/s on, or when ballasted" if slowest else "; ballast it"
     )  # fmt: skip
-    out.append(
-        Requirement("level flight", speed, "m/s", slowest or speed, trim.holds, f"{trim.why}{remedy}".lstrip("; "))
-    )
+    level = Requirement(
+        "level flight", speed, "m/s", slowest or speed, trim.holds, f"{trim.why}{remedy}".lstrip("; ")
+    )  # fmt: skip
     try:
         pilot = design_pilot(model if trim.holds else ballasted(model), speed)
-        growth = max(s.real for values in pilot.eigenvalues.values() for s in values)
-        out.append(Requirement("pilot stable", growth, "1/s", 0.0, growth < 0.0, " ".join(pilot.notes)))
     except TowtankError as error:
-        out.append(Requirement("pilot stable", float("nan"), "1/s", 0.0, False, str(error)))
-    return tuple(out)
-
-
-def _first(trajectories: Sequence[Trajectory], kind: str) -> Trajectory | None:
-    return next((t for t in trajectories if t.kind == kind), None)
-
-
-def _row(name: str, open_: Trajectory | None, key: str, closed: Trajectory, other: str, unit: str) -> Comparison:
-    left = open_.indices.get(key, (float("nan"), unit))[0] if open_ else float("nan")
-    right = closed.indices.get(other, (float("nan"), unit))[0]
-    return Comparison(name, left, right, unit, f"{open_.name if open_ else 'no open-loop trial'} against {closed.name}")
-
-
-def _notes(trajectories: Sequence[Trajectory]) -> tuple[str, ...]:
-    """Trials that ended early, and what their notes repeat."""
-    early = [f"Trial {t.name} {t.status}." for t in trajectories if t.status != "done"]
-    shared = {note for t in trajectories for note in t.provenance.get("notes", []) if note.startswith("Ballasted")}
-    moved = [note.replace("for this trial", "for its manoeuvring trials") for note in sorted(shared)]
-    return (*early, *moved)
+        return None, (level, Requirement("pilot stable", float("nan"), "1/s", 0.0, False, str(error)))
+    growth = max(s.real for values in pilot.eigenvalues.values() for s in values)
+    return pilot, (level, Requirement("pilot stable", growth, "1/s", 0.0, growth < 0.0, " ".join(pilot.notes)))

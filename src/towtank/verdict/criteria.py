@@ -8,16 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from towtank.derive.covariance import root_of
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
-from towtank.model.rigid_body import Body, mass_matrix
-from towtank.model.values import to_variant
-from towtank.symbols import LOADS, RATES
+from towtank.model.rigid_body import Body
+from towtank.verdict.many import SAMPLES, SEED, Many, Population, drawn, lumped, total_mass
 
-SAMPLES = 2000
-SEED = 20
 LINEAR = ("Yuv", "Nuv", "Yur", "Nur", "Zuw", "Muw", "Zuq", "Muq")
 
 
@@ -55,19 +51,11 @@ def samples(model: Model, count: int = SAMPLES, slopes: str = "origin", seed: in
     InputError
         Origin slopes asked of derivatives that hold none.
     """
-    d = to_variant(model.derivatives, "lumped")
-    if slopes == "origin" and not d.origin:
-        raise InputError(f"the derivatives of {d.craft} hold no slopes at the origin. Use slopes='wide'.")
-    drawn = np.random.default_rng(seed).standard_normal((count, len(d.names))) @ root_of(d.covariance, d.values).T
-    drawn = np.vstack([np.zeros(len(d.names)), drawn])
-    out = {name: d.values[i] + drawn[:, i] for i, name in enumerate(d.names)}
-    if slopes == "origin":
-        for name, value in d.origin.items():
-            spread = drawn[:, d.names.index(name)] if name in d.names else np.zeros(count + 1)
-            size = float(np.std(spread[1:])) if count > 1 else 0.0
-            unit = spread / size if size > 0.0 else np.zeros(count + 1)
-            out[name] = value + unit * d.origin_std.get(name, size)
-    return out
+    if slopes == "origin" and not model.derivatives.origin:
+        raise InputError(
+            f"the derivatives of {model.derivatives.craft} hold no slopes at the origin. Use slopes='wide'."
+        )
+    return lumped(model, drawn(model, count, seed).craft.columns, slopes)
 
 
 def horizontal_matrix(model: Model, v: Mapping[str, Array], speed: float, body: Body | None = None) -> Array:
@@ -91,7 +79,7 @@ def horizontal_matrix(model: Model, v: Mapping[str, Array], speed: float, body: 
             [get("Nuv"), get("Nur") - b.m * b.xG],
         ]
     )
-    return np.asarray(np.linalg.solve(_masses(b, v), D)[:, [1, 5], :])
+    return np.asarray(np.linalg.solve(total_mass(b, v, len(zero)), D)[:, [1, 5], :])
 
 
 def vertical_matrix(model: Model, v: Mapping[str, Array], speed: float, body: Body | None = None) -> Array:
@@ -115,22 +103,9 @@ def vertical_matrix(model: Model, v: Mapping[str, Array], speed: float, body: Bo
         ]
     )
     A = np.zeros((len(zero), 3, 3))
-    A[:, :2] = np.linalg.solve(_masses(b, v), D)[:, [2, 4], :]
+    A[:, :2] = np.linalg.solve(total_mass(b, v, len(zero)), D)[:, [2, 4], :]
     A[:, 2, 1] = 1.0
     return A
-
-
-def _masses(body: Body, v: Mapping[str, Array]) -> Array:
-    """M_RB - M_A (n, 6, 6) of the sampled derivatives."""
-    size = len(next(iter(v.values())))
-    rigid = [[np.broadcast_to(a, (size,)) for a in row] for row in mass_matrix(body)]
-    M = np.array(_matrix(rigid))
-    for i, load in enumerate(LOADS):
-        for j, rate in enumerate(RATES):
-            name = f"{load}{rate}dot"
-            if name in v:
-                M[:, i, j] -= v[name]
-    return M
 
 
 def index(model: Model, v: Mapping[str, Array], plane: str, body: Body | None = None) -> Array:
@@ -147,30 +122,41 @@ def index(model: Model, v: Mapping[str, Array], plane: str, body: Body | None = 
     return np.asarray(1.0 - np.divide(above, below, out=np.full_like(above, np.nan), where=below > 0.0))
 
 
-def plane_criteria(model: Model, plane: str, speed: float) -> PlaneCriteria:
-    """Criteria of one plane at ``speed`` [m/s]: on slopes at the origin where the derivatives hold them."""
-    slopes = "origin" if model.derivatives.origin else "wide"
-    drawn = samples(model, slopes=slopes)
-    A = (horizontal_matrix if plane == "horizontal" else vertical_matrix)(model, drawn, speed)
-    values: NDArray[np.complex128] = np.asarray(np.linalg.eigvals(A), dtype=complex)
-    growth = values.real.max(axis=1)
-    G = index(model, drawn, plane)
-    wide = {name: value[:1] for name, value in samples(model, 1, "wide").items()}
+def eigenvalues(craft: Many, plane: str, speed: float) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of ``plane`` ("horizontal" or "vertical") at ``speed`` [m/s] of n craft: (n, 2) or (n, 3)."""
+    matrix = horizontal_matrix if plane == "horizontal" else vertical_matrix
+    return np.asarray(np.linalg.eigvals(matrix(craft.model, craft.v, speed, craft.body)), dtype=complex)
+
+
+def growth(craft: Many, plane: str, speed: float) -> Array:
+    """Growth rate (n,) [1/s] of the least damped mode of ``plane`` at ``speed`` [m/s]; positive is unstable."""
+    return np.asarray(eigenvalues(craft, plane, speed).real.max(axis=1))
+
+
+def plane_criteria(model: Model, plane: str, speed: float, population: Population | None = None) -> PlaneCriteria:
+    """Criteria of one plane at ``speed`` [m/s]: on slopes at the origin where the derivatives hold them.
+
+    population : the drawn craft; ``SAMPLES`` drawn from the derivatives alone when left out.
+    """
+    craft = (population or drawn(model)).craft
+    values = eigenvalues(craft, plane, speed)
+    rate, G = values.real.max(axis=1), index(model, craft.v, plane, craft.body)
+    wide = lumped(model, {name: column[:1] for name, column in craft.columns.items()}, "wide")
     best = values[0][np.lexsort((values[0].imag, -values[0].real))]
     spread = G[1:][np.isfinite(G[1:])]
     low, high = np.quantile(spread, [0.05, 0.95]) if len(spread) else (np.nan, np.nan)
     return PlaneCriteria(
         plane=plane,
-        slopes=slopes,
+        slopes=craft.slopes,
         eigenvalues=tuple(complex(s) for s in best),
         index=float(G[0]),
         # The ratio has heavy tails; the width of the middle 68 % says more than the second moment.
         index_std=float(np.diff(np.quantile(spread, [0.1587, 0.8413]))[0] / 2.0) if len(spread) else float("nan"),
         index_range=(float(low), float(high)),
         index_wide=float(index(model, wide, plane)[0]),
-        stable=bool(growth[0] < 0.0),
-        probability=float((growth[1:] < 0.0).mean()),
-        doubling=float(np.log(2.0) / growth[0]) if growth[0] != 0.0 else float("inf"),
+        stable=bool(rate[0] < 0.0),
+        probability=float((rate[1:] < 0.0).mean()),
+        doubling=float(np.log(2.0) / rate[0]) if rate[0] != 0.0 else float("inf"),
     )
 
 

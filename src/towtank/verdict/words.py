@@ -13,19 +13,20 @@ from towtank.verdict.table import Comparison, Requirement, Verdict
 def sentences(v: Verdict) -> str:
     """Paragraphs of the verdict, parted by empty lines."""
     paragraphs = [
-        _straight(v.horizontal, v.speed, v.craft),
+        _straight(v),
         _vertical(v),
         _level(v),
         _pilot(v.requirements, v.comparison),
+        _asked(v),
         _limits(v),
     ]
     return "\n\n".join(p for p in paragraphs if p)
 
 
-def _sure(probability: float) -> str:
+def _sure(probability: float, drawn: str) -> str:
     if probability > 0.995 or probability < 0.005:
-        return "This holds for practically every set of derivatives within their uncertainty"
-    return f"Within the uncertainty of the derivatives the probability of being stable is {100.0 * probability:.0f} %"
+        return f"This holds for practically all of {drawn}"
+    return f"The probability of being stable is {100.0 * probability:.0f} % ({drawn})"
 
 
 def _mode(c: PlaneCriteria) -> str:
@@ -47,12 +48,13 @@ def _index(c: PlaneCriteria) -> str:
     return f"{c.index:.2f} {where}{band}{wide}"
 
 
-def _straight(c: PlaneCriteria, speed: float, craft: str) -> str:
+def _straight(v: Verdict) -> str:
+    c = v.horizontal
     word = "directionally stable" if c.stable else "directionally unstable"
     held = "it settles on a new straight course" if c.stable else "it does not hold a straight course by itself"
     return (
-        f"With fixed fins at {speed:g} m/s {craft} is {word}: after a disturbance {held}, and the least damped motion "
-        f"{_mode(c)}. The index G_h is {_index(c)}. {_sure(c.probability)}."
+        f"With fixed fins at {v.speed:g} m/s {v.craft} is {word}: after a disturbance {held}, and the least damped "
+        f"motion {_mode(c)}. The index G_h is {_index(c)}. {_sure(c.probability, v.drawn)}."
     )
 
 
@@ -61,8 +63,12 @@ def _vertical(v: Verdict) -> str:
     word = "stable" if c.stable else "unstable"
     text = (
         f"In the vertical plane, with its righting moment, it is {word} at this speed; the least damped motion "
-        f"{_mode(c)}. The index G_v, which leaves the righting moment out, is {_index(c)}. {_sure(c.probability)}."
+        f"{_mode(c)}. The index G_v, which leaves the righting moment out, is {_index(c)}. "
+        f"{_sure(c.probability, v.drawn)}."
     )
+    limit = next((x for x in v.criteria if x.name == "critical_speed"), None)
+    if limit and c.stable and np.isfinite(limit.value):
+        text += f" Above {limit.value:.2f} m/s it is unstable, one drawn craft in twenty above {limit.low:.2f} m/s."
     reversal = v.elevator_reversal_speed
     if reversal is None:
         return text
@@ -108,6 +114,39 @@ def _pilot(requirements: Sequence[Requirement], comparison: Sequence[Comparison]
     if travel is not None:
         parts.append(f"the fins travel {travel.closed:.2f} deg per metre")
     return "; ".join(parts) + "."
+
+
+def _asked(v: Verdict) -> str:
+    """How many requirements are met, which are not, and what decides them."""
+    asked = [r for r in v.requirements if r.sense]
+    if not asked:
+        return ""
+    missed = [r for r in asked if not r.met]
+    text = f"Of {len(asked)} requirements {len(asked) - len(missed) or 'none'} " + (
+        "are met." if len(asked) - len(missed) != 1 else "is met."
+    )
+    if missed:
+        text += f" Not met: {'; '.join(_missed(r) for r in missed)}."
+    if np.isfinite(v.together):
+        text += f" All that are put to single craft are met together with a probability of {100.0 * v.together:.0f} %."
+    return text
+
+
+def _missed(r: Requirement) -> str:
+    if not np.isfinite(r.value):
+        return f"{r.name}, which has no number here"
+    value = f"{r.value:.3g} {r.unit}".strip()
+    bar = (
+        ""
+        if r.wanted is None
+        else f" with a probability of {100.0 * r.wanted:.0f} %, and has {_percent(r.probability)}"
+    )
+    driver = f", driven by {r.drivers[0].coefficient}" if r.drivers else ""
+    return f"{r.name} ({value}, {r.sense} {r.limit:.3g}{bar}{driver})"
+
+
+def _percent(probability: float) -> str:
+    return f"{100.0 * probability:.0f} %" if np.isfinite(probability) else "none"
 
 
 def _limits(v: Verdict) -> str:
