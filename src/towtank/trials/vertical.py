@@ -46,7 +46,7 @@ def meander(
     hold_course: bool = True,
     pilot: Pilot | None = None,
 ) -> Trajectory:
-    """Elevator put over until the pitch has changed by ``pitch``, then back at its trim: what swings is the craft's own.
+    """Elevator put over until the pitch has changed by ``pitch``, then back at trim: the craft swings freely.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ def meander(
         from trim.   speed : approach speed.   hold_course : the pilot holds the heading and damps roll.
 
     Indices: time to the execute angle [s]; pitch overshoot beyond it [deg]; time from the neutral elevator until the
-    pitch has fallen to half the execute angle and until it is back at trim [s]; the pitch from trim where it turns: first,
-    second and third excursion [deg], the first sense positive; period [s] and damping ratio; largest change of depth
-    [m]; period and damping ratio of the linear model. A craft whose pitch comes back without a swing has no period; one
-    whose pitch does not come back is not stable at this speed, and the status says so.
+    pitch has fallen to half the execute angle, and until it is back at trim [s]; the pitch from trim where it turns:
+    first, second and third excursion [deg], positive to the first side; period [s] and damping ratio; largest change of
+    depth [m]; period and damping ratio of the linear model. A craft whose pitch comes back without a swing has no
+    period. One whose pitch does not come back is not stable at this speed; the status says so.
 
     Source     arentzenmandel1960: definitive manoeuvres of submarines. The damping ratio is that of the logarithmic
                decrement of half a period, from the distances between the first three excursions.
@@ -120,8 +120,8 @@ def steep_dive(
     elevator : angle from trim, without sign.
 
     Indices: time from the execute to the recovery [s]; change of depth [m] until then; pitch overshoot beyond the angle
-    [deg]; depth overshoot from the order to recover until the depth no longer changes [m], in lengths, and its time [s];
-    under the pilot the pitch overshoot of the recovery [deg]; pitch reached [deg]; lowest and highest speed [m/s].
+    [deg]; depth overshoot from the order to recover until the depth no longer changes [m], in lengths, and its time
+    [s]; under the pilot the pitch overshoot of the recovery [deg]; pitch reached [deg]; lowest and highest speed [m/s].
 
     Source     arentzenmandel1960: overshoot manoeuvre in the vertical plane.
 
