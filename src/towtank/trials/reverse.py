@@ -13,7 +13,7 @@ from towtank.model.equations import Model
 from towtank.pilot.law import Pilot
 from towtank.pilot.orders import Orders
 from towtank.quantity import Quantity
-from towtank.trials.ready import Readings, Ready, run_trial
+from towtank.trials.ready import FIN_USE, Readings, Ready, run_trial
 from towtank.trials.spiral import algebraic, held_steps, residual, steady_curve, step_rates
 from towtank.trials.start import Setting, angle, fin_limit, setting
 from towtank.trials.steady import SteadyTurns, steady_turns
@@ -30,7 +30,10 @@ APART = 0.01
 LEAST = 8
 """Points that make a curve."""
 
-_RUDDER, _TURN, _AHEAD, _DRIFT = Gauge("rudder"), Gauge("turn"), Gauge("ahead"), Gauge("drift")
+LET_GO = 0.5
+"""Share of the watched part of a step with a fin at its limit, from which on the rate is not held."""
+
+_GAUGES = (Gauge("rudder"), Gauge("turn"), Gauge("ahead"), Gauge("drift"))
 
 
 def reverse_spiral(
@@ -86,7 +89,7 @@ def reverse_spiral_ready(
     return Ready(
         name=f"reverse-spiral-{np.degrees(limit):g}deg", kind="reverse spiral", loop="closed", setting=s,
         legs=held_steps(orders, FIRST * s.convective, EACH * s.convective), interval=s.convective / 8.0,
-        gauges=(_RUDDER, _TURN, _AHEAD, _DRIFT), read=lambda flights: _indices(flights, len(orders)),
+        gauges=_GAUGES, read=lambda flights: _indices(flights, len(orders)),
         status=lambda flights: _status(flights, len(orders)), alone=algebraic(turns),
         curves=lambda flights: _curves(flights, len(orders), turns),
     )  # fmt: skip
@@ -108,17 +111,18 @@ def _orders(s: Setting, limit: float, rate: float, dive: float) -> list[Orders]:
 
 
 def _measured(flights: Flights, steps: int, i: int) -> SteadyTurns | None:
-    """The curve of craft ``i``; None where it did not go through all steps or its turns lie at one point."""
+    """The curve of craft ``i`` from the steps it held; None where it did not go through all, or held too few."""
     legs = [f"step {k}" for k in range(steps)]
     lasting = np.array([flights.duration(leg)[i] for leg in legs])
-    rudder, rate, ahead, drift = (
-        np.array([flights.stat(leg, gauge, Stat.INTEGRAL)[i] for leg in legs]) / lasting
-        for gauge in (_RUDDER, _TURN, _AHEAD, _DRIFT)
-    )
-    curvature = rate / ahead
-    if not np.all(np.isfinite(curvature)):
+    if not np.all(np.isfinite(lasting)):
         return None
+    rudder, rate, ahead, drift = (
+        np.array([flights.stat(leg, gauge, Stat.INTEGRAL)[i] for leg in legs]) / lasting for gauge in _GAUGES
+    )
+    at_limit = np.array([flights.stat(leg, FIN_USE, Stat.ABOVE)[i] for leg in legs]) / lasting
+    curvature = rate / ahead
     order = np.argsort(curvature)
+    order = order[at_limit[order] < LET_GO]
     kept = order[np.diff(curvature[order], prepend=-np.inf) > APART * np.ptp(curvature)]
     columns = (curvature, rate, rudder, drift, ahead / np.cos(drift))
     return SteadyTurns(*(values[kept] for values in columns)) if len(kept) >= LEAST else None
@@ -148,8 +152,8 @@ def _status(flights: Flights, steps: int) -> str | None:
     if _measured(flights, steps, 0) is not None:
         return None
     return (
-        "ended early: the turns at the rates ordered lie at one point, so there is no curve. The rudder has too little "
-        "effect; look at Nuudr"
+        f"ended early: fewer than {LEAST} of the {steps} turns were held, so there is no curve. The rudder has too "
+        "little effect to hold a rate; give it more angle, or look at Nuudr"
     )
 
 

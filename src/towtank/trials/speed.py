@@ -256,7 +256,7 @@ def _status(flights: Flights, s: Setting) -> str | None:
     share = 100.0 * float(last(flights, "ahead")[0]) / s.speed
     return (
         f"ended early: the speed stood at {share:.0f} % of {s.speed:g} m/s after {late.within:.0f} s, and did not get "
-        f"{late.name}; what turns or pitches the craft takes its thrust, or Xuu is not that of its resistance"
+        f"{late.name}; {s.trim.why or 'what turns or pitches the craft takes its thrust'}"
     )
 
 

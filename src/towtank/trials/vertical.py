@@ -25,10 +25,10 @@ SWING, PERIODS = 12.0, 0.75
 """A meander ends when no further turn of the pitch comes in so many lengths or periods, whichever is more."""
 SWINGS = 4
 """Turns of the pitch that are waited for."""
-SLOW = 1.5
+SLOW = 3.0
 """Time of a dive as a multiple of what the ordered pitch takes, beside ``LONGEST``."""
 STEEPEST = math.radians(60.0)
-DIVE_DEPTH = 4.0
+DIVE_DEPTH = 2.0
 """Lengths by which the depth changes before the recovery is ordered."""
 LEVELLED = 10.0
 """Lengths travelled after a recovery under the pilot, in which the pitch settles."""
@@ -116,7 +116,7 @@ def steep_dive(
     Parameters
     ----------
     pitch : angle of the dive, text with a unit or radians: positive dives, negative climbs.   depth : change of depth
-        at which the recovery is ordered, [m] or text; 4 lengths when not given.   speed : approach speed.
+        at which the recovery is ordered, [m] or text; 2 lengths when not given.   speed : approach speed.
     elevator : angle from trim, without sign.
 
     Indices: time from the execute to the recovery [s]; change of depth [m] until then; pitch overshoot beyond the angle
@@ -227,13 +227,13 @@ def _meandered(flights: Flights, s: Setting, side: float, execute: float) -> str
     if late.name == "execute":
         return (
             f"ended early: did not respond. The pitch changed by {np.degrees(stood):.2g} deg of the "
-            f"{np.degrees(execute):g} deg wanted in {late.within:.0f} s; the elevator is too weak against the righting "
-            "moment"
+            f"{np.degrees(execute):g} deg wanted in {late.within:.0f} s; {_weak(s)}"
         )
     if stood > execute:
         return (
             f"ended early: with the elevator at its trim the pitch stood {np.degrees(stood):.3g} deg off after "
-            f"{late.within:.0f} s and does not come back; the craft is not stable in pitch at {s.speed:g} m/s"
+            f"{late.within:.0f} s and does not come back; "
+            + (s.trim.why or f"the craft is not stable in pitch at {s.speed:g} m/s")
         )
     return None
 
@@ -287,8 +287,8 @@ def _dive_status(flights: Flights, s: Setting, dive: float, far: float) -> str |
     side = math.copysign(1.0, dive)
     pitch = float(-side * np.degrees(last(flights, "theta")[0] - s.trim.pitch))
     depth = float(side * (last(flights, "z")[0] - s.state[2]))
-    why = "the elevator is too weak against the righting moment"
-    if depth < 0.0:
+    why = _weak(s)
+    if depth < 0.0 and s.trim.holds:
         why += ", and the depth changes the other way: the speed is below the inversion speed of the elevator"
     if late.name == "dive":
         wanted = f" of {far:.3g} m" if s.pilot and flights.legs[0].orders.pitching else ""
@@ -298,5 +298,10 @@ def _dive_status(flights: Flights, s: Setting, dive: float, far: float) -> str |
         )
     return (
         f"ended early: did not recover. {late.within:.0f} s after the order the depth has changed by {depth:.3g} m and "
-        f"still changes at a pitch of {pitch:.3g} deg; the elevator does not level the craft"
+        f"still changes at a pitch of {pitch:.3g} deg; {s.trim.why or 'the elevator does not level the craft'}"
     )
+
+
+def _weak(s: Setting) -> str:
+    """Why an elevator does not turn a craft, in words."""
+    return s.trim.why or "the elevator is too weak against the righting moment"
