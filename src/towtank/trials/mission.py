@@ -10,10 +10,10 @@ from towtank.errors import InputError
 from towtank.model.equations import STILL, Model
 from towtank.pilot.guidance import Point
 from towtank.pilot.law import Pilot
-from towtank.quantity import Quantity, si
+from towtank.quantity import Quantity
 from towtank.trials.lines import GAUGES, LEFT, SETTLED, Line, flown, lost, off_track, turn_diameter
 from towtank.trials.ready import Ready, run_trial
-from towtank.trials.start import setting
+from towtank.trials.start import setting, span
 from towtank.trials.steps import adrift, drifting
 from towtank.trials.trajectory import Trajectory
 
@@ -35,8 +35,8 @@ def lawnmower(
 
     Parameters
     ----------
-    legs : number of long legs.   leg_length, spacing : [m] or text; when not given, 25 and 10 craft lengths or 3
-        and 1.5 turning diameters, whichever is more.
+    legs : number of long legs.   leg_length, spacing : [m] or text, ``"5 L"`` counts craft lengths; when not given, 25
+        and 10 craft lengths or 3 and 1.5 turning diameters, whichever is more.
     depth : below the start, [m] or text.   speed : through the water.   current : (3,) [m/s, NED].
 
     Indices: rms and largest distance off the long legs after the craft has come onto them (half a leg, and to the end)
@@ -66,10 +66,10 @@ def lawnmower_ready(
     length = model.craft.length
     s = setting(model, speed, pilot)
     early = max(2.0 * length, 0.5 * (diameter := turn_diameter(model, s.speed)))
-    long_ = max(25.0 * length, 3.0 * diameter) if leg_length is None else si(leg_length, "m", "leg_length")
-    short = max(10.0 * length, 1.5 * diameter) if spacing is None else si(spacing, "m", "spacing")
+    long_ = max(25.0 * length, 3.0 * diameter) if leg_length is None else span(leg_length, length, "leg_length")
+    short = max(10.0 * length, 1.5 * diameter) if spacing is None else span(spacing, length, "spacing")
     _room(legs, long_, short, length, early)
-    below, start = si(depth, "m", "depth"), adrift(s, current)
+    below, start = span(depth, length, "depth"), adrift(s, current)
     corners = _corners(legs, long_, short)
     lines = [Line(a, b, below, s.speed, early, i % 2 == 0) for i, (a, b) in enumerate(pairwise(corners))]
     pieces = flown(s, lines, length, drifting(current))

@@ -120,6 +120,7 @@ def _measured(flights: Flights, steps: int, i: int) -> SteadyTurns | None:
         np.array([flights.stat(leg, gauge, Stat.INTEGRAL)[i] for leg in legs]) / lasting for gauge in _GAUGES
     )
     at_limit = np.array([flights.stat(leg, FIN_USE, Stat.ABOVE)[i] for leg in legs]) / lasting
+    at_limit[[*range(len(HELD)), *range(steps - len(HELD), steps)]] = 0.0
     curvature = rate / ahead
     order = np.argsort(curvature)
     order = order[at_limit[order] < LET_GO]

@@ -13,7 +13,7 @@ from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.model.linear import linearise
 from towtank.pilot.law import Pilot
-from towtank.quantity import Quantity, si
+from towtank.quantity import Quantity
 from towtank.trials import start
 from towtank.trials.ready import SPEED, Readings, Ready, last, run_trial
 from towtank.trials.start import Setting
@@ -145,7 +145,7 @@ def steep_dive_ready(
     dive = start.angle(pitch, "pitch", STEEPEST, "beyond which the heading has no meaning to the pilot")
     if dive == 0.0:
         raise InputError('pitch: 0 deg is no dive. Give an angle such as "30 deg"; a negative one climbs.')
-    far = DIVE_DEPTH * model.craft.length if depth is None else si(depth, "m", "depth")
+    far = DIVE_DEPTH * model.craft.length if depth is None else start.span(depth, model.craft.length, "depth")
     if far <= 0.0:
         raise InputError(f"depth {far:g} m: the change of depth before the recovery. Give a positive one.")
     control = None if elevator is None else _control(model, elevator)
