@@ -56,7 +56,7 @@ def test_the_study_holds_document_and_bands(first: tuple[Path, dict]):
     assert (document["samples"], document["done"], document["complete"]) == (15, 15, True)
     assert document["tolerances"] == {"mass": 0.01, "cg": [0.002] * 3, "current": 0.02}
     assert document["provenance"]["version"]
-    assert len(document["trials"]) == 10
+    assert len(document["trials"]) == 14
     assert all((folder / trial["file"]).stat().st_size > 1000 for trial in document["trials"])
     for plane in ("horizontal", "vertical"):
         low, high = told["summary"]["stability"][plane]["interval"]

@@ -26,6 +26,10 @@ from towtank.figures import (
     tracks,
 )
 from towtank.trials.circle import turning_circle
+from towtank.trials.reverse import reverse_spiral
+from towtank.trials.speed import stopping
+from towtank.trials.spiral import spiral
+from towtank.trials.vertical import steep_dive
 from towtank.trials.zigzag import zigzag
 from towtank.verdict.table import Driver, Requirement
 
@@ -78,6 +82,9 @@ FIGURES = {
     "spiral": lambda: histories.spiral(_trial("zigzag")),
     "pull-out": lambda: histories.pull_out(_trial("heading")),
     "step": lambda: histories.step(_trial("heading")),
+    "speed": lambda: histories.speed(case.trials()),
+    "course": lambda: histories.course(_trial("heading")),
+    "pitch": lambda: histories.pitch(_trial("heading")),
     "fin angles": lambda: histories.fin_angles(_trial("lawnmower"), np.radians(25.0)),
     "fin effort": lambda: histories.fin_effort(case.trials()),
     "poles": lambda: poles.pole_map(SWEEP),
@@ -314,6 +321,33 @@ def test_the_numbers_on_the_figures_of_a_trial_are_its_indices():
     drawn = words(tracks.turning_circle(circle))
     for name in ("advance", "transfer", "tactical_diameter"):
         assert f"{name.replace('_', ' ')} {circle.indices[name][0]:.1f} m" in drawn
+
+
+def test_both_spirals_are_drawn_in_one_figure_with_their_own_points():
+    craft = synthetic.model(synthetic.SUBOFF)
+    direct, reverse = spiral(craft, "15 deg"), reverse_spiral(craft)
+    lines = {line.get_label(): line for line in histories.spiral([direct, reverse]).lines}
+    held = reverse.provenance["curves"]["reverse spiral"]
+    assert lines["reverse spiral"].get_xdata() == approx(held["rudder"])
+    assert lines["reverse spiral"].get_ydata() == approx(held["rate"])
+    swept = np.concatenate([lines[name].get_ydata() for name in ("first sweep", "back")])
+    assert np.sort(swept) == approx(np.sort(direct.provenance["curves"]["spiral"]["rate"]))
+    assert {"first sweep", "back"}.isdisjoint(line.get_label() for line in histories.spiral(reverse).lines)
+
+
+def test_the_speed_of_a_stop_lies_on_its_closed_form():
+    lines = histories.speed(stopping(synthetic.model(synthetic.STABLE), 0.0)).lines
+    drawn, alone = lines[0], lines[1]
+    assert alone.get_label() == "surge alone, closed form"
+    assert np.interp(drawn.get_xdata(), *alone.get_data()) == approx(drawn.get_ydata(), abs=2e-3)
+
+
+def test_a_dive_shows_the_pitch_that_was_asked_for():
+    trial = steep_dive(synthetic.model(synthetic.STABLE), "20 deg", "10 m", "3 m/s")
+    lines = {line.get_label(): line for line in histories.pitch(trial).lines}
+    assert lines["pitch"].get_ydata() == approx(np.degrees(trial.attitude[:, 1]))
+    assert lines["pitch asked"].get_ydata()[0] == approx(-20.0)
+    assert lines["elevator"].get_ydata() == approx(np.degrees(trial.command[:, 1]))
 
 
 def test_bars_keep_fit_and_model_form_apart():

@@ -13,9 +13,13 @@ from towtank.engine.run import Ensemble
 from towtank.errors import InputError, TrialError
 from towtank.trials.mission import lawnmower, lawnmower_ready
 from towtank.trials.ready import fly_ready, readings
+from towtank.trials.reverse import reverse_spiral_ready
+from towtank.trials.speed import acceleration_ready, stopping, stopping_ready
 from towtank.trials.spiral import spiral, spiral_ready
 from towtank.trials.standard import standard_ready, standard_trials
 from towtank.trials.steps import depth_step, depth_step_ready, heading_step, heading_step_ready
+from towtank.trials.vertical import meander, meander_ready, steep_dive, steep_dive_ready
+from towtank.trials.waypoints import waypoint_mission
 
 CURRENT = (0.1, -0.2, 0.0)
 SHORT = {
@@ -23,6 +27,10 @@ SHORT = {
     "heading step": lambda m: heading_step(m, "-40 deg", "3 m/s", current=CURRENT, lengths=15.0),
     "depth step": lambda m: depth_step(m, "2 m", "3 m/s", lengths=15.0),
     "lawnmower": lambda m: lawnmower(m, 2, "100 m", "60 m", "1 m", "3 m/s", current=CURRENT),
+    "crash stop": lambda m: stopping(m, -3.0, "6 m/s"),
+    "meander": lambda m: meander(m, "10 deg", "2 deg", "3 m/s"),
+    "vertical overshoot": lambda m: steep_dive(m, "10 deg", None, "3 m/s", elevator="15 deg"),
+    "mission": lambda m: waypoint_mission(m, [(100.0, 0.0), (150.0, 60.0, "1 m")], "3 m/s", current=CURRENT),
 }
 
 
@@ -50,6 +58,12 @@ READY = {
     "heading step": lambda m: heading_step_ready(m, "-40 deg", current=CURRENT),
     "depth step": lambda m: depth_step_ready(m, "-3 m"),
     "lawnmower": lambda m: lawnmower_ready(m, 2, depth="1 m", current=CURRENT),
+    "reverse spiral": lambda m: reverse_spiral_ready(m, "20 deg"),
+    "acceleration": lambda m: acceleration_ready(m),
+    "crash stop": lambda m: stopping_ready(m),
+    "meander": lambda m: meander_ready(m, "10 deg", "2 deg", "3 m/s"),
+    "steep dive": lambda m: steep_dive_ready(m, "20 deg", "10 m", "3 m/s"),
+    "vertical overshoot": lambda m: steep_dive_ready(m, "10 deg", None, "3 m/s", "15 deg"),
 }
 
 
@@ -227,7 +241,7 @@ def test_a_craft_without_a_pilot_makes_the_open_loop_trials_only(monkeypatch):
     monkeypatch.setattr("towtank.trials.standard.design_pilot", refused)
     made = standard_trials(craft)
     assert {trial.loop for trial in made} == {"open"}
-    assert len(made) == 7
+    assert len(made) == 9
     assert all("No pilot: no gains" in trial.provenance["notes"] for trial in made[1:])
     bare = replace(craft, craft=replace(craft.craft, fins=()))
     assert [trial.name for _, trial in standard_ready(bare)] == ["straight"]

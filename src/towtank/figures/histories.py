@@ -1,4 +1,4 @@
-"""Free-running trials in time: zigzag, spiral, pull-out, heading and depth steps, fin angles and effort."""
+"""Free-running trials in time: zigzag, spirals, pull-out, speed, course, pitch, steps, fin angles and effort."""
 
 from __future__ import annotations
 
@@ -60,24 +60,35 @@ def _holds(command: Array) -> list[tuple[int, int]]:
     return list(pairwise(bounds))
 
 
-def spiral(trial: Trajectory, ax: Axes | None = None) -> Axes:
-    """Yaw rate [deg/s] at the end of each hold against rudder [deg], both sweeps; steady turns as a line where found.
+def spiral(trials: Trajectory | Sequence[Trajectory], ax: Axes | None = None) -> Axes:
+    """Yaw rate [deg/s] against rudder [deg]: both sweeps of a direct spiral, the curve of a reverse one, or both.
 
-    An unstable craft shows a loop between the sweeps.
+    Steady turns of the model as a line where found. An unstable craft shows a loop between the sweeps; the reverse
+    spiral goes through it.
     """
-    curves = trial.provenance.get("curves", {})
+    several = [trials] if isinstance(trials, Trajectory) else list(trials)
+    curves = [trial.provenance.get("curves", {}) for trial in several]
     ax = new_axes(ax, width=4.4, height=3.3)
-    if "steady turns" in curves:
-        steady = curves["steady turns"]
+    steady = next((curve["steady turns"] for curve in curves if "steady turns" in curve), None)
+    if steady is not None:
         ax.plot(steady["rudder"], steady["rate"], color=GREY, linewidth=1.0, label="steady turns of the model")
-    rudder, rate, down = _spiral_points(trial)
-    ax.plot(rudder[down], rate[down], "v-", color=FIT, markersize=3.5, linewidth=1.0, label="first sweep")
-    ax.plot(rudder[~down], rate[~down], "^--", color=ORIGIN, markersize=3.5, linewidth=1.0, label="back")
+    shown = 1e-6
+    for trial, curve in zip(several, curves, strict=True):
+        if "reverse" in trial.kind:
+            # A reverse spiral of which nothing could be read has no curve.
+            held = curve.get("reverse spiral", {"rudder": [0.0], "rate": [np.nan]})
+            rudder, rate = np.asarray(held["rudder"], dtype=float), np.asarray(held["rate"], dtype=float)
+            ax.plot(rudder, rate, "o", color=INK, markersize=3.2, markerfacecolor="none", label="reverse spiral")
+        else:
+            rudder, rate, down = _spiral_points(trial)
+            ax.plot(rudder[down], rate[down], "v-", color=FIT, markersize=3.5, linewidth=1.0, label="first sweep")
+            ax.plot(rudder[~down], rate[~down], "^--", color=ORIGIN, markersize=3.5, linewidth=1.0, label="back")
+        shown = max(shown, 1.15 * float(np.abs(rudder).max()))
     frame(ax, "rudder [deg]", "yaw rate [deg/s]")
     ax.axvline(0.0, color="#aab3ba", linewidth=0.6, zorder=1)
-    shown = 1.15 * max(float(np.abs(rudder).max()), 1e-6)
     ax.set_xlim(-shown, shown)
-    head(ax, f"Spiral, {trial.name}", trial.level, NO_BAND)
+    title = " and ".join(trial.name for trial in several)
+    head(ax, f"Spiral, {title}", one_level([trial.level for trial in several]), NO_BAND)
     legend(ax)
     return ax
 
@@ -118,6 +129,46 @@ def _coasts(held: NDArray[np.bool_]) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(held)) + 1
     bounds = [*(int(edge) for edge in edges), len(held)]
     return [(begin, end) for begin, end in pairwise(bounds) if not held[begin]]
+
+
+def speed(trials: Trajectory | Sequence[Trajectory], ax: Axes | None = None) -> Axes:
+    """Speed ahead [m/s] against time [s]; surge alone in closed form dashed where it is known."""
+    several = [trials] if isinstance(trials, Trajectory) else list(trials)
+    ax, told = new_axes(ax, width=4.6, height=2.7), False
+    for colour, trial in zip(np.resize(PALETTE, len(several)), several, strict=True):
+        ax.plot(trial.time, trial.nu[:, 0], color=str(colour), linewidth=1.4, label=trial.name)
+        alone = trial.provenance.get("curves", {}).get("closed form")
+        if alone:
+            label = None if told else "surge alone, closed form"
+            ax.plot(alone["time"], alone["speed"], "--", color=GREY, linewidth=0.9, label=label)
+            told = True
+    frame(ax, "time [s]", "speed ahead [m/s]")
+    head(ax, "Speed", one_level([trial.level for trial in several]), NO_BAND)
+    legend(ax)
+    return ax
+
+
+def course(trial: Trajectory, ax: Axes | None = None) -> Axes:
+    """Heading with what was asked, and rudder granted [deg] against time [s]."""
+    return _angles(trial, "heading", trial.attitude[:, 2], "rudder", trial.command[:, 0], ax)
+
+
+def pitch(trial: Trajectory, ax: Axes | None = None) -> Axes:
+    """Pitch with what was asked, and elevator granted [deg] against time [s]."""
+    return _angles(trial, "pitch", trial.attitude[:, 1], "elevator", trial.command[:, 1], ax)
+
+
+def _angles(trial: Trajectory, followed: str, angle: Array, control: str, order: Array, ax: Axes | None) -> Axes:
+    asked = trial.setpoint.get(followed)
+    ax = new_axes(ax, width=4.6, height=2.7)
+    if asked is not None and np.isfinite(asked).any():
+        ax.plot(trial.time, np.degrees(asked), "--", color=GREY, linewidth=1.0, label=f"{followed} asked")
+    ax.plot(trial.time, np.degrees(angle), color=FIT, linewidth=1.4, label=followed)
+    ax.plot(trial.time, np.degrees(order), color=ORIGIN, linewidth=1.0, label=control)
+    frame(ax, "time [s]", "angle [deg]")
+    head(ax, f"{followed.capitalize()} and {control}, {trial.name}", trial.level, NO_BAND)
+    legend(ax)
+    return ax
 
 
 def step(trial: Trajectory, ax: Axes | None = None) -> Axes:

@@ -58,6 +58,7 @@ def _figures(it: MonteCarlo, book: Sketchbook) -> list[Block]:
         blocks.append(book.draw(montecarlo.circle_fan, it, name, caption=words))
     fans = [(name, "psi") for name in _of(it, "zigzag") if "vertical" not in it.trials[name].kind][:2]
     fans += [(name, "theta") for name in _of(it, "zigzag", "vertical")[:1]]
+    fans += [(name, "theta") for name in _of(it, "meander")[:1]]
     fans += [(name, "psi") for name in _of(it, "heading")[:1]] + [(name, "z") for name in _of(it, "depth")[:1]]
     for i in range(0, len(fans), 2):
         calls = [partial(montecarlo.channel_fan, it, name, channel) for name, channel in fans[i : i + 2]]

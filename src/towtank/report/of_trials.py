@@ -28,7 +28,8 @@ def trials(study: Study, book: Sketchbook) -> Section:
     return Section("trials", title, tuple(blocks))
 
 
-ORDER = ("straight", "circle", "zigzag, h", "zigzag", "spiral", "pull", "heading", "depth", "lawnmower")
+ORDER = ("straight", "acceleration", "stopping", "circle", "zigzag, h", "zigzag", "spiral", "pull", "meander", "dive",
+         "heading", "depth", "lawnmower", "mission", "user")  # fmt: skip
 """Words of the kinds in the order of the page: open loop first."""
 
 
@@ -47,25 +48,34 @@ def _figures(study: Study, it: Sequence[Trajectory], book: Sketchbook) -> list[B
     blocks: list[Block] = []
     for trial in _of(it, "circle")[:2]:
         blocks.append(book.draw(tracks.turning_circle, trial, caption=_caption(trial)))
-    for trial in _of(it, "spiral")[:1]:
-        blocks.append(book.draw(histories.spiral, trial, caption=_caption(trial)))
+    reverse = _of(it, "reversespiral")
+    direct = [trial for trial in _of(it, "spiral") if trial not in reverse]
+    if both := [*direct[:1], *reverse[:1]]:
+        blocks.append(book.draw(histories.spiral, both, caption=" ".join(_caption(trial) for trial in both)))
     if out := _of(it, "pullout")[:4]:
         blocks.append(book.draw(histories.pull_out, out, caption=_caption(out[0])))
-    zigzags = _of(it, "zigzag")[:4]
-    for i in range(0, len(zigzags), 2):
-        pair = zigzags[i : i + 2]
-        calls = [partial(histories.zigzag, trial) for trial in pair]
-        blocks.append(book.panels(calls, " ".join(_caption(trial) for trial in pair), (2.1,), len(calls)))
     steps = [*_of(it, "headingstep")[:1], *_of(it, "depthstep")[:1]]
-    if steps:
-        calls = [partial(histories.step, trial) for trial in steps]
-        blocks.append(book.panels(calls, " ".join(_caption(trial) for trial in steps), (2.0,), len(calls)))
-    if mission := _of(it, "lawnmower", "mission")[:1]:
-        limit = min((fin.max_angle for fin in study.craft.fins), default=None) if study.craft else None
-        blocks.append(book.draw(tracks.plan_view, mission, caption=_caption(mission[0])))
-        blocks.append(book.draw(histories.fin_angles, mission[0], limit, caption="Fin angles through the mission."))
-        blocks.append(book.draw(tracks.depth_profile, mission, caption="Depth through the mission."))
-    elif it:
+    dives = [*_of(it, "meander")[:1], *_of(it, "steepdive")[:2]]
+    pairs = ((_of(it, "zigzag")[:4], histories.zigzag), (dives, histories.pitch), (steps, histories.step))
+    for some, figure in pairs:
+        for i in range(0, len(some), 2):
+            calls = [partial(figure, trial) for trial in some[i : i + 2]]
+            words = " ".join(_caption(trial) for trial in some[i : i + 2])
+            blocks.append(book.panels(calls, words, (2.1,), len(calls)))
+    if changes := [*_of(it, "acceleration")[:1], *_of(it, "stopping")[:2]]:
+        blocks.append(book.draw(histories.speed, changes, caption=" ".join(_caption(trial) for trial in changes)))
+    missions = [*_of(it, "lawnmower")[:1], *_of(it, "mission")[:2]]
+    limit = min((fin.max_angle for fin in study.craft.fins), default=None) if study.craft else None
+    for trial in missions:
+        blocks.append(book.draw(tracks.plan_view, trial, caption=_caption(trial)))
+        blocks.append(book.draw(histories.fin_angles, trial, limit, caption="Fin angles through the mission."))
+        blocks.append(book.draw(tracks.depth_profile, trial, caption="Depth through the mission."))
+    for trial in _of(it, "userdefined")[:4]:
+        calls = [partial(histories.course, trial), partial(histories.pitch, trial)]
+        blocks.append(book.draw(tracks.plan_view, trial, caption=_caption(trial)))
+        blocks.append(book.panels(calls, "Heading and rudder, pitch and elevator.", (2.0,), len(calls)))
+        blocks.append(book.draw(tracks.depth_profile, trial, caption="Depth through the trial."))
+    if it and not missions:
         blocks.append(book.draw(tracks.depth_profile, it[:6], caption="Depth in the trials."))
     if any(t.delta.shape[1] for t in it):
         words = (
@@ -83,7 +93,7 @@ def _caption(trial: Trajectory) -> str:
 
 def _sentence(status: str) -> str:
     """Why a trial ended, as a sentence that says that it did."""
-    words = status if status.startswith("ended early") else f"ended early: {status}"
+    words = status if status.startswith(("ended early", "not completed")) else f"ended early: {status}"
     return words.rstrip(".") + "."
 
 

@@ -42,10 +42,11 @@ def turning_circle(
         rudder is open loop. False leaves elevator and roll as trimmed, and a heavy craft sinks.
 
     Indices: advance, transfer, tactical diameter, steady diameter [m] (and in lengths), time to 90, 180 and 360 deg
-    [s], drift angle [deg], speed loss [%], yaw rate [deg/s]. Transfer and diameters count towards the side of the turn.
+    [s], drift angle [deg], speed loss [%], yaw rate [deg/s], roll [deg]. Transfer and diameters count towards the side
+    of the turn.
     The steady values are means over the last quarter turn, or over the last 40 lengths where 540 deg are not reached.
 
-    Source     ittc75040201: distances from the execute, at 90 and 180 deg of heading change.
+    Source     ittc75040201, imo2002: distances from the execute, at 90 and 180 deg of heading change.
 
     Raises
     ------
@@ -103,6 +104,7 @@ def _distances(flights: Flights, length: float) -> Readings:
         "transfer": (transfer, "m"),
         "tactical_diameter": (tactical, "m"),
         "advance_lengths": (advance / length, ""),
+        "transfer_lengths": (transfer / length, ""),
         "tactical_diameter_lengths": (tactical / length, ""),
         "time_to_90": (flights.when("to 90 deg"), "s"),
         "time_to_180": (flights.when("to 180 deg"), "s"),

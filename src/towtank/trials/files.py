@@ -28,6 +28,7 @@ _LONG = {
 }  # fmt: skip
 _UNITS = dict.fromkeys(_POSITION, "m") | dict.fromkeys(_ATTITUDE + _COMMAND, "rad") | dict.fromkeys("uvw", "m/s")
 _UNITS |= dict.fromkeys("pqr", "rad/s")
+_SETPOINTS = {"depth": "m", "turn": "rad/s", "throttle": "1"}
 _ATTRS = {name: {"units": _UNITS[name], "long_name": _LONG[name]} for name in _LONG}
 
 
@@ -39,9 +40,8 @@ def trajectory_variables(t: Trajectory) -> tuple[dict[str, Variable], dict[str, 
         variables |= series(names, values, along, _ATTRS)
     variables["delta"] = Variable(("time", "fin"), t.delta, {"units": "rad", "long_name": "fin angles"})
     for name, values in t.setpoint.items():
-        variables[f"setpoint_{name}"] = Variable(
-            along, values, {"units": "m" if name == "depth" else "rad", "long_name": f"{name} ordered"}
-        )
+        unit = _SETPOINTS.get(name, "rad")
+        variables[f"setpoint_{name}"] = Variable(along, values, {"units": unit, "long_name": f"{name} ordered"})
     attrs = {
         "name": t.name, "kind": t.kind, "loop": t.loop, "craft": t.craft, "level": t.level, "status": t.status,
         "indices": {name: {"value": value, "unit": unit} for name, (value, unit) in t.indices.items()},

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.engine.clock import clock_of
 from towtank.engine.flights import Flights
@@ -92,21 +93,38 @@ def run_trial(model: Model, trial: Ready) -> Trajectory:
 
     time = flights.time[kept]
     leg = np.minimum(np.searchsorted(flights.mark_time[0][: _flown(flights)], time, side="right"), len(trial.legs) - 1)
-    wanted, deep = np.full(len(time), np.nan), np.full(len(time), np.nan)
-    for i, item in enumerate(trial.legs):
-        if item.orders.piloted and (item.orders.steer or item.orders.track):
-            wanted[leg == i] = flights.series("heading")[0, kept][leg == i]
-        if item.orders.piloted and item.orders.dive:
-            deep[leg == i] = item.orders.depth
     indices = {name: (float(values[0]), unit) for name, (values, unit) in readings(model, trial, flights).items()}
     return Trajectory(
         name=trial.name, kind=trial.kind, loop=trial.loop, craft=model.craft.name, level=model.derivatives.level,
         time=time, position=channel("x", "y", "z"), attitude=channel("phi", "theta", "psi"),
         nu=channel("u", "v", "w", "p", "q", "r"), delta=channel(*(f"delta{i + 1}" for i in range(fins))),
-        command=channel("rudder", "elevator", "aileron"), setpoint={"heading": wanted, "depth": deep},
+        command=channel("rudder", "elevator", "aileron"),
+        setpoint=_setpoints(trial, leg, flights.series("heading")[0, kept]),
         indices={**indices, **(trial.alone or {})}, status=_status(trial, flights),
         provenance=_provenance(model, trial, flights),
     )  # fmt: skip
+
+
+def _setpoints(trial: Ready, leg: NDArray[np.int64], heading: Array) -> dict[str, Array]:
+    """What was asked of the pilot at each sample, NaN where nothing was; ``leg`` (S,) that each is in.
+
+    Always heading [rad] and depth [m]; turn [rad/s], pitch [rad] and throttle where a leg has such an order.
+    """
+    orders = [item.orders for item in trial.legs]
+    steered = np.array([o.piloted * max(o.steer, o.track) for o in orders])[leg] == 1.0
+    dived = np.array([o.piloted * o.dive for o in orders])[leg] == 1.0
+    turning, pitching = (np.array([getattr(o, key) for o in orders])[leg] == 1.0 for key in ("turning", "pitching"))
+
+    def where(asked: NDArray[np.bool_], values: Array) -> Array:
+        return np.where(asked, values, np.nan)
+
+    def ordered(name: str) -> Array:
+        return np.array([float(getattr(o, name)) for o in orders])[leg]
+
+    found = {"heading": where(steered & ~turning, heading), "depth": where(dived & ~pitching, ordered("depth"))}
+    more = {"turn": where(steered & turning, ordered("turn")), "pitch": where(dived & pitching, ordered("pitch"))}
+    found |= {name: values for name, values in more.items() if np.isfinite(values).any()}
+    return found | ({"throttle": ordered("throttle")} if any(o.throttle != 1.0 for o in orders) else {})
 
 
 def _flown(flights: Flights) -> int:

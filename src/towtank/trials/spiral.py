@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from towtank.engine.plan import Leg
 from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.pilot.law import Pilot
+from towtank.pilot.orders import Orders
 from towtank.quantity import Quantity
 from towtank.trials.ready import Readings, Ready, run_trial
 from towtank.trials.start import Setting, angle, fin_limit, setting
@@ -70,38 +72,47 @@ def spiral_ready(
     convective = s.convective * s.speed / max(float(turns.speed[reached].min()), 0.3 * s.speed)
     return Ready(
         name=f"spiral-{np.degrees(limit):g}deg", kind="spiral", loop="open", setting=s,
-        legs=_legs(s, sweep, float(hold_depth), convective), interval=s.convective / 8.0,
-        read=lambda flights: _indices(flights, rudders), alone=_algebraic(turns),
+        legs=held_steps(_orders(s, sweep, float(hold_depth)), FIRST * convective, EACH * convective),
+        interval=s.convective / 8.0, read=lambda flights: _indices(flights, rudders), alone=algebraic(turns),
         curves=lambda flights: _curves(flights, sweep, turns),
     )  # fmt: skip
 
 
-def _legs(s: Setting, sweep: Array, dive: float, convective: float) -> tuple[Leg, ...]:
-    """Two legs for each step: until the rate is watched, and while it is."""
+def _orders(s: Setting, sweep: Array, dive: float) -> list[Orders]:
+    return [s.orders(rudder=float(rudder), dive=dive) for rudder in sweep]
+
+
+def held_steps(orders: Sequence[Orders], first: float, each: float) -> tuple[Leg, ...]:
+    """Two legs for each order, "step N settling" and "step N", its last quarter; ``first``, ``each`` [s] it lasts."""
     legs = []
-    for i, rudder in enumerate(sweep):
-        orders, lasting = s.orders(rudder=float(rudder), dive=dive), (EACH if i else FIRST) * convective
+    for i, order in enumerate(orders):
+        lasting = each if i else first
         legs += [
-            Leg(f"step {i} settling", orders, (1.0 - WATCHED) * lasting), Leg(f"step {i}", orders, WATCHED * lasting),
+            Leg(f"step {i} settling", order, (1.0 - WATCHED) * lasting), Leg(f"step {i}", order, WATCHED * lasting),
         ]  # fmt: skip
     return tuple(legs)
 
 
-def _rates(flights: Flights, steps: int) -> tuple[Array, Array]:
+def step_rates(flights: Flights, steps: int) -> tuple[Array, Array]:
     """Turning rate (N, steps) [rad/s] at the end of every step, and its change over the part that is watched."""
     end = np.stack([flights.at(f"step {i}", "turn", event=False) for i in range(steps)], axis=-1)
     before = np.stack([flights.at(f"step {i} settling", "turn", event=False) for i in range(steps)], axis=-1)
     return end, end - before
 
 
-def _indices(flights: Flights, rudders: Array) -> Readings:
-    rate, change = _rates(flights, 2 * len(rudders) - 1)
-    down, up = rate[:, : len(rudders)], rate[:, len(rudders) - 1 :][:, ::-1]
-    largest = np.fmax.reduce(np.abs(rate), axis=1)
+def residual(end: Array, change: Array) -> Array:
+    """Largest of the changes (N, steps) in per cent of the largest rate ``end`` (N, steps)."""
+    largest = np.fmax.reduce(np.abs(end), axis=1)
     with np.errstate(all="ignore"):
-        residual = 100.0 * np.fmax.reduce(np.abs(change), axis=1) / largest
+        share = 100.0 * np.fmax.reduce(np.abs(change), axis=1) / largest
     # A craft that has not turned at all was steady.
-    return {**_loop(rudders, down, up), "residual_change": (np.where(largest == 0.0, 0.0, residual), "%")}
+    return np.where(largest == 0.0, 0.0, share)
+
+
+def _indices(flights: Flights, rudders: Array) -> Readings:
+    rate, change = step_rates(flights, 2 * len(rudders) - 1)
+    down, up = rate[:, : len(rudders)], rate[:, len(rudders) - 1 :][:, ::-1]
+    return {**_loop(rudders, down, up), "residual_change": (residual(rate, change), "%")}
 
 
 def _loop(rudders: Array, down: Array, up: Array) -> Readings:
@@ -131,7 +142,7 @@ def _turnover(rudders: Array, rate: Array) -> Array:
 
 def _curves(flights: Flights, sweep: Array, turns: SteadyTurns) -> dict[str, Any]:
     """The measured curve of one craft, as far as it got, and the algebraic one."""
-    rate = _rates(flights, len(sweep))[0][0]
+    rate = step_rates(flights, len(sweep))[0][0]
     got = int(np.count_nonzero(~np.isnan(rate)))
     down = min((len(sweep) + 1) // 2, got)
     return {
@@ -140,18 +151,24 @@ def _curves(flights: Flights, sweep: Array, turns: SteadyTurns) -> dict[str, Any
             "rate": np.degrees(rate[:got]),
             "sweep": ["down"] * down + ["up"] * (got - down),
         },
-        "steady turns": {
-            "rudder": np.degrees(turns.rudder),
-            "rate": np.degrees(turns.rate),
-            "drift": np.degrees(turns.drift),
-            "speed": turns.speed,
-        },
+        "steady turns": steady_curve(turns),
     }
 
 
-def _algebraic(turns: SteadyTurns) -> dict[str, tuple[float, str]]:
+def steady_curve(turns: SteadyTurns) -> dict[str, Array]:
+    """A curve of steady turns as it is kept with a trial: rudder, drift [deg], rate [deg/s], speed [m/s]."""
+    return {
+        "rudder": np.degrees(turns.rudder),
+        "rate": np.degrees(turns.rate),
+        "drift": np.degrees(turns.drift),
+        "speed": turns.speed,
+    }
+
+
+def algebraic(turns: SteadyTurns) -> dict[str, tuple[float, str]]:
+    """Width, height and slope of the algebraic curve, as indices."""
     return {
         "loop_width_algebraic": (float(np.degrees(turns.rudder_span())), "deg"),
-        "loop_height_algebraic": (float(np.degrees(2.0 * turns.free_rate())), "deg/s"),
+        "loop_height_algebraic": (float(np.degrees(turns.rate_span())), "deg/s"),
         "slope_algebraic": (turns.slope(), "1/s"),
     }

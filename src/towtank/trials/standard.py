@@ -9,6 +9,7 @@ import numpy as np
 
 from towtank.errors import TrialError
 from towtank.model.equations import Model
+from towtank.model.linear import linearise
 from towtank.pilot.design import design_pilot
 from towtank.pilot.law import Pilot
 from towtank.progress import Progress, Silent
@@ -16,11 +17,14 @@ from towtank.trials.circle import circle_ready
 from towtank.trials.mission import lawnmower_ready
 from towtank.trials.pullout import pull_out_ready
 from towtank.trials.ready import Ready, run_trial
+from towtank.trials.reverse import reverse_spiral_ready
+from towtank.trials.speed import stopping_ready
 from towtank.trials.spiral import spiral_ready
 from towtank.trials.start import ballasted, fin_limit, level_trim
 from towtank.trials.steps import depth_step_ready, heading_step_ready
 from towtank.trials.straight import straight_ready
 from towtank.trials.trajectory import Trajectory
+from towtank.trials.vertical import meander_ready, steep_dive_ready
 from towtank.trials.zigzag import zigzag_ready
 
 Trial = Callable[[Model, Pilot | None], Ready]
@@ -29,6 +33,22 @@ Trial = Callable[[Model, Pilot | None], Ready]
 def within(model: Model, degrees: float) -> str:
     """The angle of a standard trial, or what the fins reach where that is less, as text."""
     return f"{min(degrees, np.floor(10.0 * np.degrees(fin_limit(model))) / 10.0):.3g} deg"
+
+
+def pitch_within(model: Model, elevator: float, degrees: float) -> str:
+    """The pitch of a standard trial, or half of what ``elevator`` [deg] makes in steady flight where that is less.
+
+    Source     Steady solution of w, q, theta in the linear model; left out where the vertical plane is not stable.
+    """
+    part = linearise(model, model.craft.speed).part(("w", "q", "theta"), ("elevator",))
+    if part.eigenvalues.real.max() < 0.0:
+        steady = np.linalg.solve(part.A, -part.B[:, 0])[2] * elevator
+        degrees = min(degrees, max(np.floor(5.0 * abs(steady)) / 10.0, 0.1))
+    return f"{degrees:.3g} deg"
+
+
+def _limit(model: Model) -> float:
+    return float(np.degrees(fin_limit(model)))
 
 
 OPEN_LOOP: dict[str, Trial] = {
@@ -41,10 +61,16 @@ OPEN_LOOP: dict[str, Trial] = {
     ),
     "spiral": lambda m, p: spiral_ready(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
     "pull-out": lambda m, p: pull_out_ready(m, within(m, 15.0), pilot=p, hold_depth=p is not None),
+    "crash stop": lambda m, p: stopping_ready(m, pilot=p, hold_depth=p is not None),
+    "meander": lambda m, p: meander_ready(
+        m, within(m, 10.0), pitch_within(m, min(10.0, _limit(m)), 5.0), pilot=p, hold_course=p is not None
+    ),
 }
 """Trials with the rudder or elevator open loop. The pilot holds depth and damps roll where there is one."""
 
 CLOSED_LOOP: dict[str, Trial] = {
+    "reverse spiral": lambda m, p: reverse_spiral_ready(m, within(m, 15.0), pilot=p),
+    "steep dive": lambda m, p: steep_dive_ready(m, pitch_within(m, 0.5 * _limit(m), 30.0), pilot=p),
     "heading step": lambda m, p: heading_step_ready(m, "30 deg", pilot=p),
     "depth step": lambda m, p: depth_step_ready(m, pilot=p),
     "lawnmower": lambda m, p: lawnmower_ready(m, pilot=p),
@@ -97,7 +123,7 @@ def standard_trials(model: Model, progress: Progress | None = None) -> tuple[Tra
     made = []
     for name in setting.names:
         trajectory = run_trial(setting.model(name), setting.ready(name))
-        made.append(trajectory if name in AS_LOADED else _noted(trajectory, setting.notes))
+        made.append(trajectory if name in AS_LOADED else noted(trajectory, setting.notes))
         progress.step("trials", name)
     progress.done("trials")
     return tuple(made)
@@ -125,7 +151,7 @@ def _setting(model: Model) -> _Setting:
         return _Setting(model, neutral, None, (*notes, f"No pilot: {error}"))
 
 
-def _noted(made: Trajectory, notes: tuple[str, ...]) -> Trajectory:
+def noted(made: Trajectory, notes: tuple[str, ...]) -> Trajectory:
     """``made`` with what has to be said of all trials."""
     merged = [*made.provenance.get("notes", []), *notes]
     return replace(made, provenance={**made.provenance, "notes": merged})

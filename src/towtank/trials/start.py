@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,8 @@ from towtank.pilot.orders import Orders
 from towtank.quantity import Quantity, si
 
 STEEPEST_TRIM = np.radians(30.0)
+_LENGTHS = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*L\s*")
+"""A number of craft lengths."""
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,20 @@ def angle(value: Quantity, where: str, limit: float, reason: str) -> float:
             f'unit are radians; write for example "{np.degrees(limit) / 2.0:.3g} deg".'
         )
     return number
+
+
+def span(value: Quantity, length: float, where: str) -> float:
+    """Distance [m] of text such as ``"200 m"``, of craft lengths such as ``"5 L"``, or of a number in metres.
+
+    length : of the craft [m].
+
+    Raises
+    ------
+    InputError
+        Not a distance.
+    """
+    lengths = _LENGTHS.fullmatch(value) if isinstance(value, str) else None
+    return float(lengths[1]) * length if lengths else si(value, "m", where)
 
 
 def fin_limit(model: Model) -> float:

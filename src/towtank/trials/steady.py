@@ -30,20 +30,22 @@ class SteadyTurns:
     def rudder_span(self) -> float:
         """Rudder [rad] between the folds of the curve: the width of the spiral's loop; 0 for a single-valued curve.
 
-        Source     Folds where d(rudder)/d(curvature) changes sign, from a cubic through the points.
+        Source     Folds where d(rudder)/d(curvature) changes sign, the first to either side of straight flight, from a
+                   cubic through the points.
         """
         spline = self._over(self.rudder)
-        heights = spline(spline.derivative().roots(extrapolate=False))
-        return float(np.ptp(heights)) if len(heights) > 1 else 0.0
+        at = spline.derivative().roots(extrapolate=False)
+        left, right = at[at < 0.0], at[at > 0.0]
+        return float(abs(spline(left.max()) - spline(right.min()))) if len(left) and len(right) else 0.0
 
     def slope(self) -> float:
         """d(rate)/d(rudder) at zero rate [1/s]; its sign is that of the rudder's effect on a stable craft."""
         return float(self._over(self.rate).derivative()(0.0) / self._over(self.rudder).derivative()(0.0))
 
-    def free_rate(self) -> float:
-        """Largest turning rate [rad/s] with the rudder amidships: half the height of the loop; 0 when stable."""
+    def rate_span(self) -> float:
+        """Difference of the turning rates [rad/s] that need no rudder: the height of the loop; 0 when stable."""
         roots = self._over(self.rudder).roots(extrapolate=False)
-        return float(np.abs(self._over(self.rate)(roots)).max()) if len(roots) > 1 else 0.0
+        return float(np.ptp(self._over(self.rate)(roots))) if len(roots) > 1 else 0.0
 
     def _over(self, values: Array) -> CubicSpline:
         return CubicSpline(self.curvature, values)
@@ -56,7 +58,8 @@ def steady_turns(model: Model, speed: float, largest: float = 0.6, points: int =
     S-curve of an unstable craft folds back, and one yaw rate even where the loss of speed makes the rate fall again. A
     branch ends where no steady turn is found.
 
-    Source     Zero accelerations u, v, r in ``Model.rates`` with w, p, q, phi and theta zero; scipy's hybrid method.
+    Source     Zero loads X, Y, N in ``Model.rates`` with w, p, q, phi and theta zero; scipy's hybrid method. Zero
+               accelerations would hold a share of the rolling moment where the CG is low.
     Departure  A free-running craft pitches and rolls in a turn; this curve leaves that out, as the classical one does.
     Valid      Fins are not limited, so that the curve is smooth; compare the rudder with the limit.
 
@@ -89,14 +92,14 @@ def turning_diameter(model: Model, speed: float, rudder: float) -> float:
 def _branch(model: Model, U: float, curvatures: Array) -> list[tuple[float, ...]]:
     length, thrust = model.craft.length, model.thrust(U)
     mixing = model.craft.mixing[:, 0]
-    size = np.array([U, U, U / length]) * U / length
+    size = np.diag(model.mass_matrix)[[0, 1, 5]] * np.array([U, U, U / length]) * U / length
 
     def residual(unknown: Array, curvature: float) -> Array:
         u, v, dr = unknown[0] * U, unknown[1] * U, unknown[2]
         rate = float(curvature * u)
         fins = [float(m * dr) for m in mixing]
         out = model.rates([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(u), float(v), 0.0, 0.0, 0.0, rate, *fins], fins, thrust)
-        return np.array([out[6], out[7], out[11]]) / size
+        return np.asarray((model.mass_matrix @ np.array(out[6:12]))[[0, 1, 5]] / size)
 
     guess = before = np.array([1.0, 0.0, 0.0])
     rows: list[tuple[float, ...]] = []

@@ -12,9 +12,9 @@ from towtank.errors import InputError
 from towtank.frames import Array, rotation
 from towtank.model.equations import STILL, Model
 from towtank.pilot.law import Pilot
-from towtank.quantity import Quantity, si
+from towtank.quantity import Quantity
 from towtank.trials.ready import Readings, Ready, run_trial
-from towtank.trials.start import Setting, angle, setting
+from towtank.trials.start import Setting, angle, setting, span
 from towtank.trials.trajectory import Trajectory
 
 LEAD = 2.0
@@ -116,7 +116,7 @@ def depth_step_ready(
     lengths: float = DEPTH_LENGTHS,
 ) -> Ready:
     """The depth step, ready to fly; arguments as in ``depth_step``."""
-    step = model.craft.length / 3.0 if change is None else si(change, "m", "change")
+    step = model.craft.length / 3.0 if change is None else span(change, model.craft.length, "change")
     if step == 0.0:
         raise InputError('change: a depth step of 0 m tells nothing. Give a distance such as "2 m".')
     s, away = setting(model, speed, pilot), Gauge("psi", absolute=True)
