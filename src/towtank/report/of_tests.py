@@ -165,7 +165,13 @@ def _fin_figures(study: Study, book: Sketchbook) -> list[Block]:
             if study.craft and study.craft.fins
             else []
         )
-    words = "Fin loads against the virtual angle. The derivative holds in the shaded range; the rest is recorded only."
+    words = (
+        "Fin loads against the virtual angle. The derivative is fitted in the shaded range, the fin curve to all runs."
+    )
+    if study.derivatives is None or study.derivatives.fin_curve is None:
+        words = (
+            "Fin loads against the virtual angle. The derivative holds in the shaded range; the rest is recorded only."
+        )
     return [book.panels(calls[:3], words, (2.3,), len(calls[:3]))]
 
 

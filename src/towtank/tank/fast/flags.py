@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from towtank.tank.fast.build import Build
-from towtank.tank.fast.fins import STALL_ANGLE, STALL_ASPECT
+from towtank.tank.fast.fins import stall_angle
 from towtank.tank.fast.motion import MotionRecord
 
 
@@ -46,8 +46,10 @@ def _motion_flags(body: Build, record: MotionRecord) -> list[str]:
         why = "it needs headway all along the run" if record.memory else "as asked, every load is quasi-steady"
         found.append(f"memory switched off: {why}")
     for index, data in enumerate(body.fins):
-        stall = np.degrees(float(np.interp(data.aspect, STALL_ASPECT, STALL_ANGLE)))
+        stall = float(np.degrees(stall_angle(data.aspect, data.edge, data.slope)))
         largest = float(np.degrees(np.abs(record.delta[:, index]).max()))
         if largest > 0.6 * stall:
-            found.append(f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- 6 deg)")
+            found.append(
+                f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- {0.12 * stall:.0f} deg)"
+            )
     return found
