@@ -1,7 +1,7 @@
 """Fins of the fast tank against a published table of rudder lift and drag (aveva2023), through the stall.
 
-The largest lift of the tank was set on one entry of the table, aspect ratio 2 at 30 deg; the rest is predicted. The table
-does not state its rudder: a square tip of taper 0.45 is assumed, with the edge drag 0.82 of whickerfehlner1958.
+The largest lift of the tank was set on one entry of the table, aspect ratio 2 at 30 deg; the rest is predicted.
+The table does not state its rudder: a square tip of taper 0.45 is assumed, edge drag 0.82 (whickerfehlner1958).
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def test_largest_lift_is_the_largest_of_the_table() -> None:
 
 
 def test_side_edge_of_the_remus_fin_is_between_the_two_tips() -> None:
-    """prestero2001 takes a faired tip, 0.558 at a taper of 0.654; the tank, which knows no tip, the mean with square."""
+    """prestero2001 takes a faired tip, 0.558 at a taper of 0.654; the tank, which knows no tip, the mean of both."""
     taper = 0.654
     assert 0.1 + 0.7 * taper == pytest.approx(0.558, abs=5e-4)
     assert side_edge_drag(taper) == pytest.approx(0.5 * (0.558 + 0.1 + 1.6 * taper), abs=5e-4)

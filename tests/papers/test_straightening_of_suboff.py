@@ -1,7 +1,7 @@
 """Straightening factors of SUBOFF's stern planes from roddy1990: hull and planes less the bare hull (THEORY section 5).
 
-The rudder derivatives were measured on the craft with ring wing and sail, so the level of both factors is known to 30 %;
-their ratio does not rest on them.
+The rudder derivatives were measured on the craft with ring wing and sail, so the level of both factors is known to
+30 %; their ratio does not rest on them.
 """
 
 from __future__ import annotations

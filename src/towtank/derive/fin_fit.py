@@ -134,7 +134,7 @@ def fit_fin_curve(runs: Sequence[Run], terms: Mapping[str, Array]) -> tuple[FinC
     beyond = sizes[sizes > FIN_LIMIT_DEG + 0.01]
     if len(beyond) < 2:
         return None, (
-            f"{len(beyond)} fin angles beyond {FIN_LIMIT_DEG:g} deg among the straight runs; a stall shows in two or more"
+            f"{len(beyond)} fin angles beyond {FIN_LIMIT_DEG:g} deg among the straight runs; a stall needs two"
         )
     best = _fitted(sweep)
     nominal, members, without = best[:, 0], best[:4, 1 : sweep.angle.shape[1]], best[:4, sweep.angle.shape[1] :]

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from towtank.tank.fast.build import Build
+from towtank.tank.fast.constants import CONSTANTS
 from towtank.tank.fast.fins import stall_angle
 from towtank.tank.fast.motion import MotionRecord
+
+STALL_DOUBT = next(item.spread for item in CONSTANTS if item.name == "fin_stall")
+"""Relative standard deviation of a stall angle."""
 
 
 def flags(body: Build, record: MotionRecord) -> tuple[str, ...]:
@@ -50,6 +54,6 @@ def _motion_flags(body: Build, record: MotionRecord) -> list[str]:
         largest = float(np.degrees(np.abs(record.delta[:, index]).max()))
         if largest > 0.6 * stall:
             found.append(
-                f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- {0.12 * stall:.0f} deg)"
+                f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- {STALL_DOUBT * stall:.0f} deg)"
             )
     return found
