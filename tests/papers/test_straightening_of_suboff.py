@@ -6,12 +6,17 @@ The rudder derivatives were measured on the craft with ring wing and sail, so th
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from suboff import DATA
 from towtank import read_craft
-from towtank.derive.straightening import factors, straightening
+from towtank.derive.convert import about_point
+from towtank.derive.fin_curve import FinCurve
+from towtank.derive.straightening import factors, straightening, with_straightening
+from towtank.model.values import known
 
 ARM = 0.448
 """Stocks aft of the reference point over the length (THEORY section 5)."""
@@ -66,3 +71,23 @@ def test_factors_do_not_depend_on_where_the_planes_sit_around_the_hull() -> None
     assert cross.kappa_v == pytest.approx(plus.kappa_v, rel=0.01)
     assert cross.kappa_r == pytest.approx(plus.kappa_r, rel=0.01)
     assert straightening(read_craft("suboff-bare")) is None
+
+
+def test_the_factors_enter_the_fin_curve_and_move_with_its_point_of_reference() -> None:
+    """What turning brings to the fins is the same whatever point the derivatives refer to."""
+    craft = read_craft("suboff-fins")
+    curve = FinCurve(0.6, 0.0, 0.1, 0.1, "the test")
+    here = replace(known(craft, {"Yuudr": 1.0}, "lumped", "published"), fin_curve=curve)
+    found = with_straightening(here, craft).fin_curve
+    moved = with_straightening(about_point(here, craft.origin_from_nose - 0.3), craft).fin_curve
+    assert found is not None
+    assert moved is not None
+    assert found.kappa_level == "semi-empirical"
+    assert found.kappa_v == moved.kappa_v > 0.0
+    there = about_point(replace(here, fin_curve=found), craft.origin_from_nose - 0.3).fin_curve
+    assert there is not None
+    assert moved.kappa_r == pytest.approx(there.kappa_r)
+    assert moved.kappa_r != pytest.approx(found.kappa_r, rel=0.01)
+    bare = replace(here, fin_curve=None)
+    assert with_straightening(bare, craft) is bare
+    assert with_straightening(here, read_craft("suboff-bare")) is here

@@ -242,7 +242,7 @@ def _fin_models(ax: Axes, data: Sweep, load: str, control: str, derivatives: Der
 
     ax.plot(np.degrees(angle), modelled(angle), color=FIT, linewidth=1.3, label="derivative")
     deflected = [run for run in data.runs if run.delta.any()]
-    if curve is not None:
+    if curve is not None and deflected:
         there = modelled(acting(curve, deflected, CONTROL[control], angle))
         words = f"fin curve, fins stall at {np.degrees(curve.stall):.0f} +- {2.0 * np.degrees(curve.std[0]):.0f} deg"
         ax.plot(np.degrees(angle), there, "--", color=ORIGIN, linewidth=1.3, label=words if curve.drop else "fin curve")

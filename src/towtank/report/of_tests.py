@@ -8,6 +8,7 @@ from math import radians
 
 import numpy as np
 
+from towtank.derive.show import fin_words
 from towtank.figures import forces, series
 from towtank.frames import drift_angle, incidence_angle
 from towtank.plan.kinds import Plan
@@ -172,7 +173,8 @@ def _fin_figures(study: Study, book: Sketchbook) -> list[Block]:
         words = (
             "Fin loads against the virtual angle. The derivative holds in the shaded range; the rest is recorded only."
         )
-    return [book.panels(calls[:3], words, (2.3,), len(calls[:3]))]
+    stated_words = [Text(line) for line in fin_words(study.derivatives)] if study.derivatives else []
+    return [book.panels(calls[:3], words, (2.3,), len(calls[:3])), *stated_words]
 
 
 def _oscillations(study: Study, book: Sketchbook) -> list[Block]:

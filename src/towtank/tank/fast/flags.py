@@ -53,7 +53,6 @@ def _motion_flags(body: Build, record: MotionRecord) -> list[str]:
         stall = float(np.degrees(stall_angle(data.aspect, data.edge, data.slope)))
         largest = float(np.degrees(np.abs(record.delta[:, index]).max()))
         if largest > 0.6 * stall:
-            found.append(
-                f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- {STALL_DOUBT * stall:.0f} deg)"
-            )
+            doubt = STALL_DOUBT * stall
+            found.append(f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- {doubt:.0f} deg)")
     return found
