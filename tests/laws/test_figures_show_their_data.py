@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import synthetic_craft as synthetic
+from towtank.derive.fin_curve import FinCurve
 from towtank.figures import (
     coefficients,
     forces,
@@ -269,6 +270,17 @@ def test_stall_is_marked_only_where_the_force_falls_again():
     ax = forces.fin_load(case.stalled(), "Y", "rudder")
     assert any("20 deg" in str(line.get_label()) for line in ax.lines)
     assert "no stall inside the sweep" in words(forces.fin_load(case.runs(), "Y", "rudder"))
+
+
+def test_fin_curve_is_drawn_beside_the_derivative():
+    curve = FinCurve(np.radians(22.0), 0.1, 0.3, np.radians(6.0), "the test", std=(0.02, 0.0, 0.0, 0.0))
+    ax = forces.fin_load(case.runs(), "Y", "rudder", replace(case.derivatives(), fin_curve=curve))
+    lines = {str(line.get_label()): line for line in ax.lines}
+    drawn = lines["fin curve, fins stall at 22 +- 2 deg"]
+    angle = np.radians(drawn.get_xdata())
+    # One degree of rudder is one degree of each X fin, and the run is at 1 m/s.
+    assert drawn.get_ydata() == approx(case.derivatives()["Yuudr"] * curve(angle))
+    assert lines["derivative"].get_ydata() == approx(case.derivatives()["Yuudr"] * angle)
 
 
 def test_dropped_period_and_used_cycles_do_not_overlap():

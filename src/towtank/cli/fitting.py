@@ -31,13 +31,15 @@ def inputs(chain: Chain) -> dict[str, str]:
 
 
 def fit(chain: Chain) -> Derivatives:
-    """Derivatives of the runs of the study, checked against the sizes of the craft.
+    """Derivatives of the runs of the study, with the straightening factors, checked against the sizes of the craft.
 
     Within a budget: those of the fast tank, corrected by the runs.
     """
     from towtank.derive.consistency import consistency
+    from towtank.derive.straightening import with_straightening
 
     derived = budget.corrected(chain) if towing.asked(chain)["budget"] else _of_runs(chain)
+    derived = with_straightening(derived, chain.craft)
     checks = [check.document() for check in consistency(derived, chain.craft)]
     return replace(derived, quality={**derived.quality, "consistency": checks})
 

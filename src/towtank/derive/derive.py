@@ -14,6 +14,7 @@ from towtank.derive.consistency import consistency
 from towtank.derive.convert import about_point
 from towtank.derive.cycles import settled
 from towtank.derive.expand import Expansion, expand
+from towtank.derive.fin_fit import fit_fin_curve
 from towtank.derive.fourier import fourier
 from towtank.derive.identify import Method, identify
 from towtank.derive.mesh import mesh_covariance
@@ -62,7 +63,8 @@ def derive(
 
     Returns
     -------
-    Derivatives in SI with covariance, variant "lumped". Main values are the wide-range fit; ``origin`` the slopes.
+    Derivatives in SI with covariance, variant "lumped". Main values are the wide-range fit; ``origin`` the slopes;
+    ``fin_curve`` the fin loads beyond the linear range, where straight runs go there.
 
     Raises
     ------
@@ -115,7 +117,9 @@ def _derivatives(it: _Fitted) -> Derivatives:
     members = expansion.matrix @ unknowns
     spread = members[:, 1:] - members[:, :1]
     names = [name_of(run, it.given) for run in runs]
-    origin = origin_slopes(runs, samples, dict(zip(expansion.names, members, strict=True)))
+    terms = dict(zip(expansion.names, members, strict=True))
+    origin = origin_slopes(runs, samples, terms)
+    curve, no_curve = fit_fin_curve(_not_rejected(it), terms)
     flat = np.zeros((len(members), len(members)))
     return Derivatives(
         craft=runs[0].craft,
@@ -131,9 +135,16 @@ def _derivatives(it: _Fitted) -> Derivatives:
         rejected=(*it.outside, *it.judged.rejected),
         origin=origin.values,
         origin_std=origin.std,
-        quality=_quality(it, names, expansion, origin, spread),
+        quality=_quality(it, names, expansion, origin, spread) | ({"fin_curve": no_curve} if no_curve else {}),
         provenance=provenance({name: run.id for name, run in zip(names, runs, strict=True)}),
+        fin_curve=curve,
     )
+
+
+def _not_rejected(it: _Fitted) -> tuple[Run, ...]:
+    """The runs given, those beyond the range of the model among them, without those that screening rejected."""
+    rejected = {name for name, _ in it.judged.rejected}
+    return tuple(run for run in it.given if name_of(run, it.given) not in rejected)
 
 
 def _quality(it: _Fitted, names: Sequence[str], expansion: Expansion, origin: Origin, spread: Array) -> dict[str, Any]:

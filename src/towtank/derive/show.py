@@ -135,6 +135,25 @@ def _unassessed(d: Derivatives) -> str:
     return ", ".join(missing) if missing else "none"
 
 
+def fin_words(d: Derivatives) -> list[str]:
+    """Sentences on fin loads beyond the linear range and on the straightening factors; why there are none."""
+    curve = d.fin_curve
+    if curve is None:
+        return [f"No fin curve: {d.quality['fin_curve']}."] if d.quality.get("fin_curve") else []
+    stall, width = (math.degrees(curve.stall), math.degrees(curve.std[0])), math.degrees(curve.width)
+    lines = [
+        f"Fin curve ({curve.level}): {'stall' if curve.drop else 'no stall up to'} {pair(*stall)} deg, curvature "
+        f"{pair(curve.curvature, curve.std[1])} /rad, drop {pair(curve.drop, curve.std[2])} over {width:.2g} deg; "
+        f"residual {100.0 * curve.residual:.2g} %; {curve.source}."
+    ]
+    if curve.kappa_level:
+        lines.append(
+            f"Straightening ({curve.kappa_level}): kappa_v {pair(curve.kappa_v, curve.kappa_std[0])}, kappa_r "
+            f"{pair(curve.kappa_r, curve.kappa_std[1])}; {curve.kappa_source}."
+        )
+    return lines
+
+
 def _foot(d: Derivatives) -> list[str]:
     lines = []
     if d.origin:
@@ -146,6 +165,7 @@ def _foot(d: Derivatives) -> list[str]:
             f"Fit over {q.get('runs')} runs, drift to {q.get('range_deg'):g} deg, fins to {q.get('fins_range_deg'):g} "
             f"deg; condition number {q['condition_number']:.3g}; steady-drift weight {q.get('weight_steady'):g}."
         )
+    lines += fin_words(d)
     if d.rejected:
         lines.append(f"Not fitted: {len(d.rejected)} runs, such as {d.rejected[0][0]} ({d.rejected[0][1]}).")
     if q.get("not_excited"):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from towtank.derive.fin_fit import acting
 from towtank.derive.table import Derivatives
 from towtank.figures.paper import (
     BAD,
@@ -185,7 +186,7 @@ def fin_load(
     linear_to: float | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Load [N, N m] of the virtual rudder, elevator or aileron against its angle [deg].
+    """Load [N, N m] of the virtual rudder, elevator or aileron against its angle [deg], with derivative and fin curve.
 
     linear_to : end of the range the slope was fitted over [rad]; shaded. The largest load is marked as the stall
     when it lies inside the sweep; otherwise the figure says that none was reached.
@@ -205,10 +206,7 @@ def fin_load(
             label="linear range fitted",
         )
     if derivatives is not None:
-        angle = np.linspace(data.angle[0], data.angle[-1], 31)
-        nu, controls = _states(control, angle, data.runs[0].speed)
-        mean = modelled_at(derivatives, nu, np.zeros_like(nu), controls, data.runs[0].origin_from_nose)[0]
-        ax.plot(np.degrees(angle), mean[:, LOADS.index(load)], color=FIT, linewidth=1.3, label="derivative")
+        _fin_models(ax, data, load, control, derivatives)
     ax.errorbar(
         degrees, data.load, yerr=None if data.std is None else 2.0 * data.std, fmt="o-", markersize=3.2, linewidth=0.7,
         color=INK, ecolor=GREY, elinewidth=0.7, capsize=1.5, label="runs",
@@ -230,6 +228,24 @@ def fin_load(
     legend(ax)
     ax.set_xlim(degrees[0] - 1.5, degrees[-1] + 1.5)
     return ax
+
+
+def _fin_models(ax: Axes, data: Sweep, load: str, control: str, derivatives: Derivatives) -> None:
+    """The derivative as a line, and the fin curve where there is one, with its stall angle and 2 std of it."""
+    angle = np.linspace(data.angle[0], data.angle[-1], 121)
+    curve, run = derivatives.fin_curve, data.runs[0]
+
+    def modelled(virtual: Array) -> Array:
+        nu, controls = _states(control, virtual, run.speed)
+        mean = modelled_at(derivatives, nu, np.zeros_like(nu), controls, run.origin_from_nose)[0]
+        return mean[:, LOADS.index(load)]
+
+    ax.plot(np.degrees(angle), modelled(angle), color=FIT, linewidth=1.3, label="derivative")
+    deflected = [run for run in data.runs if run.delta.any()]
+    if curve is not None and deflected:
+        there = modelled(acting(curve, deflected, CONTROL[control], angle))
+        words = f"fin curve, fins stall at {np.degrees(curve.stall):.0f} +- {2.0 * np.degrees(curve.std[0]):.0f} deg"
+        ax.plot(np.degrees(angle), there, "--", color=ORIGIN, linewidth=1.3, label=words if curve.drop else "fin curve")
 
 
 def shares(runs: Sequence[Run], load: str = "Y", kind: str = "drift", ax: Axes | None = None) -> Axes:

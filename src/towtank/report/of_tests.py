@@ -8,6 +8,7 @@ from math import radians
 
 import numpy as np
 
+from towtank.derive.show import fin_words
 from towtank.figures import forces, series
 from towtank.frames import drift_angle, incidence_angle
 from towtank.plan.kinds import Plan
@@ -165,8 +166,15 @@ def _fin_figures(study: Study, book: Sketchbook) -> list[Block]:
             if study.craft and study.craft.fins
             else []
         )
-    words = "Fin loads against the virtual angle. The derivative holds in the shaded range; the rest is recorded only."
-    return [book.panels(calls[:3], words, (2.3,), len(calls[:3]))]
+    words = (
+        "Fin loads against the virtual angle. The derivative is fitted in the shaded range, the fin curve to all runs."
+    )
+    if study.derivatives is None or study.derivatives.fin_curve is None:
+        words = (
+            "Fin loads against the virtual angle. The derivative holds in the shaded range; the rest is recorded only."
+        )
+    stated_words = [Text(line) for line in fin_words(study.derivatives)] if study.derivatives else []
+    return [book.panels(calls[:3], words, (2.3,), len(calls[:3])), *stated_words]
 
 
 def _oscillations(study: Study, book: Sketchbook) -> list[Block]:

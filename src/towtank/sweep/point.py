@@ -10,6 +10,7 @@ from typing import Any
 from towtank.craft.craft import Craft, Mass
 from towtank.derive.derive import derive
 from towtank.derive.show import origin_primes, primes
+from towtank.derive.straightening import with_straightening
 from towtank.derive.table import Derivatives
 from towtank.errors import TrialError
 from towtank.model.equations import Model
@@ -86,7 +87,7 @@ def evaluate(craft: Craft, tank: FastTank | None = None, trials: Sequence[str] =
 @lru_cache(maxsize=8)
 def _derived(craft: Craft, tank: FastTank) -> Derivatives:
     """Derivatives of a craft. The water does not feel where the weight is: variants of mass and CG share them."""
-    return derive(tow(standard_plan(craft), tank))
+    return with_straightening(derive(tow(standard_plan(craft), tank)), craft, tank)
 
 
 def _carried_out(model: Model, name: str) -> tuple[Trajectory | None, list[str]]:

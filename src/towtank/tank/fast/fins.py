@@ -18,10 +18,13 @@ SIDEWASH_LAG = 0.45
 """Travel in lengths from where the upstream cross-flow is read to the fins (half the hull, by geometry)."""
 REVERSED = 0.7
 """Lift slope and stall angle of a fin in reversed flow over those ahead (judgement: sharp nose, blunt tail)."""
-STALL_ASPECT, STALL_ANGLE = [0.5, 1.0, 2.0, 3.0, 6.0], np.radians([42.0, 34.0, 25.0, 20.0, 16.0])
-"""Stall angle against effective aspect ratio (whickerfehlner1958, rounded)."""
-STALL_WIDTH = np.radians(3.5)
-"""Width of the blend from attached flow to a flat plate (judgement)."""
+LARGEST_LIFT = 1.375
+"""Largest lift coefficient of a fin: the largest entry of the rudder table aveva2023 (aspect ratio 2, 30 deg)."""
+STALL_WIDTH = 0.5
+"""Angle over which the stalled lift is lost, over the stall angle (judgement: the rudder table loses 5 % in the first
+5 deg, the ramp of kjellberg2023, 0.25, loses 40 % there)."""
+STALL_LIMIT = np.radians(60.0)
+"""Largest stall angle that a draw of the ensemble may reach."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +33,15 @@ class FinData:
 
     kw, kb, kd : factors on the fin's own force in incidence, of the carry-over in incidence, and of the fin's own
     force in deflection (the carry-over in deflection takes the same share).
-    wake : mean dynamic pressure over that ahead.   drag : profile drag coefficient.
+    edge : drag coefficient of the side edge.   wake : mean dynamic pressure over that ahead.   drag : profile drag
+    coefficient.
     """
 
     fin: Fin
     area: float
     aspect: float
     slope: float
+    edge: float
     x: float
     y: float
     x_hull: float
@@ -106,35 +111,74 @@ def fin_data(craft: Craft, fin: Fin, wake: float, friction: float) -> FinData:
     thick = fin.thickness
     return FinData(
         fin=fin, area=area, aspect=aspect, slope=lift_slope(aspect, sweep),
+        edge=side_edge_drag(fin.tip_chord / max(float(fin.chord(fin.tip_radius - span)), 1e-9)),
         x=float(body_x(trailing - 0.75 * mean_chord, craft.origin_from_nose)), y=centre,
         x_hull=float(body_x(trailing - 0.5 * mean_chord, craft.origin_from_nose)),
         kw=kw, kb=kb, kd=kd, wake=wake, drag=2.0 * friction * (1 + 2 * thick + 60 * thick**4),
     )  # fmt: skip
 
 
+def side_edge_drag(taper: float) -> float:
+    """Drag coefficient C_Dc of the cross-flow at the side edge, ``taper`` the tip chord over the root chord.
+
+    Source     whickerfehlner1958: 0.1 + 1.6 taper for square tips, as in kjellberg2023, eq. 51; 0.1 + 0.7 taper for
+               faired ones, as in prestero2001, table 2.2.
+    Departure  The mean of the two: the craft file states no tip.
+    """
+    return 0.1 + 1.15 * taper
+
+
+def attached_lift(aspect: float, edge: float, slope: Array | float, angle: Array | float) -> Array:
+    """Lift coefficient of an attached fin at ``angle`` >= 0 [rad]; ``slope`` [1/rad], ``edge`` as ``side_edge_drag``.
+
+    Source     whickerfehlner1958: C_L = slope alpha + (C_Dc / A) alpha^2; kjellberg2023, eq. 48.
+    Valid      Up to the stall, aspect ratio 0.5 to 4.
+    """
+    return np.asarray(slope * angle + edge / aspect * np.square(angle))
+
+
+def stall_angle(aspect: float, edge: float, slope: float) -> float:
+    """Angle [rad] of the largest lift of a fin: where ``attached_lift`` reaches ``LARGEST_LIFT``.
+
+    Source     One largest lift for all aspect ratios: this project. With a square tip of taper 0.45 it gives 40 deg at
+               aspect ratio 1, where the table aveva2023 still rises at its end, 35 deg, and 30 deg at 2, where it
+               turns.
+    Departure  Below aspect ratio 1 the angle is that of 1 (judgement): the lift of slender fins grows to larger angles,
+               not smaller ones. No effect of Reynolds number, thickness or roughness.
+    Valid      Aspect ratio 1 to 4, within 12 % (the ensemble's ``fin_stall``).
+    """
+    if aspect < 1.0:
+        return stall_angle(1.0, edge, lift_slope(1.0))
+    curve = edge / aspect
+    return float(2.0 * LARGEST_LIFT / (slope + np.sqrt(slope**2 + 4.0 * curve * LARGEST_LIFT)))
+
+
 def section_forces(angle: Array, data: FinData, p: Mapping[str, Array]) -> tuple[Array, Array]:
     """Normal and chordwise force coefficients (m, N) at ``angle`` (m, N) in -pi..pi [rad].
 
-    Attached flow: lift slope, cross-flow drag of the side edge, and leading-edge suction such that the drag is
-    C_L^2 / (0.9 pi A). Beyond stall: a flat plate. Reversed flow: REVERSED of slope and stall angle.
+    Up to the stall: ``attached_lift`` and the drag C_L^2 / (0.9 pi A). Beyond it both pass to those of a flat plate
+    along a cubic, over ``STALL_WIDTH`` of the stall angle. Reversed flow: REVERSED of slope and stall angle.
 
-    Source     whickerfehlner1958 attached; hoerner1965 plate.
-    Departure  A smooth blend over STALL_WIDTH; no hysteresis, no Reynolds-number effect.
-    Valid      Stall angle +-6 deg.
+    Source     whickerfehlner1958 attached; hoerner1965 plate, 1.14 at 90 deg; kjellberg2023 for the cubic and the lift
+               held beyond the stall.
+    Departure  No hysteresis, no Reynolds-number effect. The plate is 12 % below the post-stall lift of spera2008.
+    Valid      Stall angle within 12 %; beyond the stall 30 % (judgement).
     """
     size = np.abs(angle)
     reversed_ = size > 0.5 * np.pi
     x = np.where(reversed_, np.pi - size, size)
-    slope = np.where(reversed_, REVERSED, 1.0) * data.slope * p["fin_slope"][:, None]
-    lift = slope * np.sin(x) * np.cos(x)
-    attached = lift + np.sin(x) ** 2 / data.aspect
-    plate = 1.14 * np.sin(x) / (0.56 + 0.44 * np.sin(x))
-    stall = float(np.interp(data.aspect, STALL_ASPECT, STALL_ANGLE)) * p["fin_stall"][:, None]
-    stall = stall * np.where(reversed_, REVERSED, 1.0)
-    still = 1.0 / (1.0 + np.exp(np.minimum((x - 1.15 * stall) / STALL_WIDTH, 60.0)))
-    normal = np.sign(angle) * (still * attached + (1.0 - still) * plate)
-    suction = still * np.maximum(lift * np.sin(x) - lift**2 / (0.9 * np.pi * data.aspect), 0.0)
-    return normal, np.where(reversed_, -suction, suction)
+    share = np.where(reversed_, REVERSED, 1.0)
+    stall = np.minimum(stall_angle(data.aspect, data.edge, data.slope) * p["fin_stall"][:, None] * share, STALL_LIMIT)
+    slope = share * data.slope * p["fin_slope"][:, None]
+    lift = attached_lift(data.aspect, data.edge, slope, np.minimum(x, stall))
+    beyond = np.clip((x - stall) / (STALL_WIDTH * stall), 0.0, 1.0)
+    lost = beyond * beyond * (3.0 - 2.0 * beyond)
+    sine, cosine = np.sin(x), np.cos(x)
+    plate = 1.14 * sine / (0.56 + 0.44 * sine)
+    drag = (1.0 - lost) * lift**2 / (0.9 * np.pi * data.aspect) + lost * plate * sine
+    lift = (1.0 - lost) * lift + lost * plate * cosine
+    chordwise = lift * sine - drag * cosine
+    return np.sign(angle) * (lift * cosine + drag * sine), np.where(reversed_, -chordwise, chordwise)
 
 
 def fin_load(data: FinData, record: MotionRecord, index: int, upstream: Array, p: Mapping[str, Array]) -> Array:
@@ -146,7 +190,8 @@ def fin_load(data: FinData, record: MotionRecord, index: int, upstream: Array, p
 
     Source     whickerfehlner1958 and pitts1957, times the wake's dynamic pressure, less the sidewash of the hull
                (TANK notes, section 3.4). The interference fades with (u/V)^2.
-    Valid      Attached fins at |delta| <= 15 deg within 30 % (SUBOFF control derivatives).
+    Valid      Attached fins at |delta| <= 15 deg within 30 % (SUBOFF control derivatives); beyond the stall see
+               ``section_forces``.
     """
     fin = data.fin
     along, lift = fin.span_direction, fin.lift_direction

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from towtank.tank.fast.build import Build
-from towtank.tank.fast.fins import STALL_ANGLE, STALL_ASPECT
+from towtank.tank.fast.constants import CONSTANTS
+from towtank.tank.fast.fins import stall_angle
 from towtank.tank.fast.motion import MotionRecord
+
+STALL_DOUBT = next(item.spread for item in CONSTANTS if item.name == "fin_stall")
+"""Relative standard deviation of a stall angle."""
 
 
 def flags(body: Build, record: MotionRecord) -> tuple[str, ...]:
@@ -46,8 +50,9 @@ def _motion_flags(body: Build, record: MotionRecord) -> list[str]:
         why = "it needs headway all along the run" if record.memory else "as asked, every load is quasi-steady"
         found.append(f"memory switched off: {why}")
     for index, data in enumerate(body.fins):
-        stall = np.degrees(float(np.interp(data.aspect, STALL_ASPECT, STALL_ANGLE)))
+        stall = float(np.degrees(stall_angle(data.aspect, data.edge, data.slope)))
         largest = float(np.degrees(np.abs(record.delta[:, index]).max()))
         if largest > 0.6 * stall:
-            found.append(f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- 6 deg)")
+            doubt = STALL_DOUBT * stall
+            found.append(f"fin {data.fin.name} at {largest:.0f} deg, near its stall ({stall:.0f} +- {doubt:.0f} deg)")
     return found

@@ -23,7 +23,7 @@ from towtank.tank.record import record
 from towtank.tank.run import Run
 
 LEVEL = "semi-empirical"
-PHYSICS = 1
+PHYSICS = 2
 """Raised when a formula of the tank changes, so that runs made with the former one are not taken for its own."""
 MEMORY_TRAVEL = 1.3
 """Lead-in before a test, in lengths travelled: the longest memory is one length."""
