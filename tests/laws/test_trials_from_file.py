@@ -210,6 +210,17 @@ def test_an_order_stands_until_another_takes_its_place(craft, written):
     assert np.diff([0.0, *ends]) == pytest.approx([20 * 8.15 / 3, 10 * 8.15 / 3, 5 * 8.15 / 3, 12.0])
 
 
+def test_a_pitch_is_ordered_from_level_whatever_the_trim(written):
+    heavy = synthetic.model(synthetic.STABLE, net_buoyancy=-0.2)
+    text = 'name = "nose"\nspeed = "2 m/s"\n[[command]]\npitch = "{} deg"\nfor = "20 L"\n'
+    for wanted in (0.0, 5.0):
+        trial = trial_from_file(heavy, written(text.format(wanted)))
+        assert np.degrees(trial.setpoint["pitch"][-1]) == pytest.approx(wanted)
+        # The elevator's trim is that of level flight; a tenth of the way from there is not made good.
+        missing = 0.15 * abs(wanted - np.degrees(trial.provenance["trim"]["pitch"]))
+        assert np.degrees(trial.attitude[-1, 1]) == pytest.approx(wanted, abs=missing)
+
+
 def test_without_a_pilot_nothing_is_held(written):
     craft = synthetic.model(synthetic.SUBOFF, net_buoyancy=-0.02)
     text = 'name = "drift"\nloop = "open"\n[[command]]\nrudder = "2 deg"\nfor = "10 L"\n'

@@ -74,6 +74,26 @@ def test_a_craft_that_is_not_stable_in_pitch_does_not_come_back():
     assert np.isnan(trial.indices["period"][0])
 
 
+def test_a_pitch_that_goes_over_has_no_excursions():
+    loose = synthetic.model({**synthetic.SUBOFF, "Nuv": -0.016}, zg=0.001)
+    trial = meander(loose, "10 deg", "5 deg", SPEED)
+    assert trial.indices["largest_pitch"][0] > 60.0
+    assert "went beyond 60 deg; the craft is not stable in pitch" in trial.status
+    assert np.isnan(trial.indices["first_excursion"][0])
+
+
+def test_a_craft_that_flies_nose_up_dives_from_its_trim_and_levels_to_it():
+    heavy = synthetic.model(synthetic.STABLE, net_buoyancy=-0.2)
+    trial = steep_dive(heavy, "15 deg", "10 m", "2 m/s")
+    trimmed = np.degrees(trial.provenance["trim"]["pitch"])
+    assert trimmed > 1.0
+    assert trial.status == "done"
+    # The cross-flow takes a tenth of the pitch ordered; level, nothing is left but the decay of 10 lengths.
+    assert trial.indices["pitch_reached"][0] == pytest.approx(15.0, rel=0.15)
+    assert np.degrees(trial.attitude[-1, 1]) == pytest.approx(trimmed, abs=0.1)
+    assert np.degrees(trial.setpoint["pitch"][0]) == pytest.approx(trimmed - 15.0)
+
+
 def test_an_elevator_too_weak_for_the_angle_says_how_far_it_got(craft):
     trial = meander(craft, "10 deg", "5 deg")
     assert "did not respond" in trial.status

@@ -121,8 +121,12 @@ def _setpoints(trial: Ready, leg: NDArray[np.int64], heading: Array) -> dict[str
     def ordered(name: str) -> Array:
         return np.array([float(getattr(o, name)) for o in orders])[leg]
 
+    trimmed = trial.setting.trim.pitch
     found = {"heading": where(steered & ~turning, heading), "depth": where(dived & ~pitching, ordered("depth"))}
-    more = {"turn": where(steered & turning, ordered("turn")), "pitch": where(dived & pitching, ordered("pitch"))}
+    more = {
+        "turn": where(steered & turning, ordered("turn")),
+        "pitch": where(dived & pitching, ordered("pitch") + trimmed),
+    }
     found |= {name: values for name, values in more.items() if np.isfinite(values).any()}
     return found | ({"throttle": ordered("throttle")} if any(o.throttle != 1.0 for o in orders) else {})
 

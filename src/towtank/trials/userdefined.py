@@ -182,7 +182,8 @@ def _changed(gate: _Gate, orders: Orders, item: CommandTable, where: str) -> Ord
         changes |= {"depth": gate.value(item.depth, SEEN["depth"], f"{where}, depth"), "dive": 1.0, "pitching": 0.0}
     if item.pitch is not None:
         pitch = angle("pitch", STEEPEST, "beyond which heading and roll lose their meaning")
-        changes |= {"pitch": pitch, "dive": 1.0, "pitching": 1.0}
+        # The pilot's elevator trim holds the trimmed pitch, from which its order counts.
+        changes |= {"pitch": pitch - gate.s.trim.pitch, "dive": 1.0, "pitching": 1.0}
     if item.throttle is not None:
         changes["throttle"] = si(item.throttle, "", f"{where}, throttle")
     return replace(orders, **changes)

@@ -15,7 +15,7 @@ from towtank.model.linear import linearise
 from towtank.pilot.law import Pilot
 from towtank.quantity import Quantity
 from towtank.trials import start
-from towtank.trials.ready import SPEED, Readings, Ready, last, run_trial
+from towtank.trials.ready import PITCH, SPEED, Readings, Ready, last, run_trial
 from towtank.trials.start import Setting
 from towtank.trials.trajectory import Trajectory
 
@@ -197,7 +197,10 @@ def _linear(model: Model, speed: float) -> tuple[float, float]:
 
 def _swings(flights: Flights, s: Setting, side: float, execute: float) -> Readings:
     begin = flights.when("execute")
-    first, second, third = (side * (flights.at(f"swing {i}", "theta") - s.trim.pitch) for i in (1, 2, 3))
+    over = flights.over(PITCH, Stat.HIGH) > STEEPEST
+    first, second, third = (
+        np.where(over, np.nan, side * (flights.at(f"swing {i}", "theta") - s.trim.pitch)) for i in (1, 2, 3)
+    )
     depth, back, half = flights.gauges[-3:]
     with np.errstate(all="ignore"):
         decrement = np.log((first - second) / (third - second))
@@ -208,7 +211,7 @@ def _swings(flights: Flights, s: Setting, side: float, execute: float) -> Readin
         "time_to_half_pitch": (flights.stat("swing 2", half, Stat.FIRST) - begin, "s"),
         "time_to_return": (flights.stat("swing 2", back, Stat.FIRST) - begin, "s"),
         **{f"{n}_excursion": (np.degrees(e), "deg") for n, e in zip(_ORDINAL, (first, second, third), strict=True)},
-        "period": (flights.when("swing 3") - flights.when("swing 1"), "s"),
+        "period": (np.where(over, np.nan, flights.when("swing 3") - flights.when("swing 1")), "s"),
         "damping_ratio": (decrement / np.hypot(decrement, math.pi), ""),
         "depth_excursion": (np.maximum(*depths), "m"),
     }
@@ -220,6 +223,10 @@ def _farthest(flights: Flights, leg: str, s: Setting, side: float) -> Array:
 
 
 def _meandered(flights: Flights, s: Setting, side: float, execute: float) -> str | None:
+    unstable = s.trim.why or f"the craft is not stable in pitch at {s.speed:g} m/s"
+    if flights.over(PITCH, Stat.HIGH)[0] > STEEPEST:
+        most = np.degrees(STEEPEST)
+        return f"ended early: with the elevator at its trim the pitch went beyond {most:.0f} deg; {unstable}"
     if flights.ended[0] != Ended.LATE:
         return None
     stood = float(side * (last(flights, "theta")[0] - s.trim.pitch))
@@ -232,16 +239,18 @@ def _meandered(flights: Flights, s: Setting, side: float, execute: float) -> str
     if stood > execute:
         return (
             f"ended early: with the elevator at its trim the pitch stood {np.degrees(stood):.3g} deg off after "
-            f"{late.within:.0f} s and does not come back; "
-            + (s.trim.why or f"the craft is not stable in pitch at {s.speed:g} m/s")
+            f"{late.within:.0f} s and does not come back; {unstable}"
         )
     return None
 
 
 def _piloted(s: Setting, dive: float, depth: float, within: float) -> tuple[Leg, ...]:
-    """Dive at the pitch until the depth has changed, level until it no longer changes, and on."""
-    down = s.orders(steer=1.0, dive=1.0, pitching=1.0, pitch=s.trim.pitch - dive)
-    level = s.orders(steer=1.0, dive=1.0, pitching=1.0, pitch=s.trim.pitch)
+    """Dive at the pitch until the depth has changed, level until it no longer changes, and on.
+
+    The pilot's elevator trim holds the trimmed pitch, from which an order counts.
+    """
+    down = s.orders(steer=1.0, dive=1.0, pitching=1.0, pitch=-dive)
+    level = s.orders(steer=1.0, dive=1.0, pitching=1.0, pitch=0.0)
     return (
         Leg("dive", down, within, Until("z", depth), required=True),
         Leg("recover", level, LONGEST * s.convective, Until("sink", 0.0), required=True),
