@@ -50,13 +50,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
     TrialError
         The craft has no fins, or its fins cannot stabilise heading or pitch.
     """
-    speed = model.craft.speed if speed is None else float(speed)
-    if not speed > 0.0 or not np.isfinite(speed):
-        raise InputError(
-            f"pilot of {model.craft.name}: speed {speed:g} m/s. Fins need forward speed; give a positive one."
-        )
-    if not model.craft.fins:
-        raise TrialError(f"craft {model.craft.name} has no fins, so no pilot can steer it. Run open-loop trials only.")
+    speed = speed_of(model, speed)
     linear = linearise(model, speed)
     range_ = min(float(fin.max_angle) for fin in model.craft.fins)
     lag = max(float(fin.time_constant) for fin in model.craft.fins)
@@ -66,7 +60,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
     roll = _roll(linear, speed, length, lag, range_)
     k_r, k_psi, k_i = heading[2]
     k_q, k_theta = pitch[2]
-    order = _pitch_order(pitch)
+    order = steady_pitch_order(pitch)
     k_h, k_z, k_zi = depth[2][2:] / order
     loops: dict[str, Loop] = {"heading": heading, "depth": depth, "roll": roll}
     return Pilot(
@@ -88,7 +82,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
         unwind=2.0 * length / speed,
         heading_band=float(HEADING_ERROR * BAND_SHARE),
         depth_band=float(DEPTH_ERROR * length * BAND_SHARE),
-        reversal=_reversal(model, speed),
+        reversal=reversal_below(model, speed),
         eigenvalues={name: tuple(complex(s) for s in closed_loop(*loop)) for name, loop in loops.items()},
         margins={
             "heading": margins(*heading),
@@ -96,11 +90,31 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
             "depth": margins(*depth),
             **({"roll": margins(*roll)} if np.any(roll[2]) else {}),
         },
-        notes=_notes(linear, loops, speed),
+        notes=notes_of(linear, loops, speed),
     )
 
 
-def _require(loop: Loop, name: str, where: str) -> Loop:
+def speed_of(model: Model, speed: float | None) -> float:
+    """``speed`` [m/s], or the craft's own, if a pilot can be designed for it.
+
+    Raises
+    ------
+    InputError
+        The speed is not positive.
+    TrialError
+        The craft has no fins.
+    """
+    speed = model.craft.speed if speed is None else float(speed)
+    if not speed > 0.0 or not np.isfinite(speed):
+        raise InputError(
+            f"pilot of {model.craft.name}: speed {speed:g} m/s. Fins need forward speed; give a positive one."
+        )
+    if not model.craft.fins:
+        raise TrialError(f"craft {model.craft.name} has no fins, so no pilot can steer it. Run open-loop trials only.")
+    return speed
+
+
+def require_stable(loop: Loop, name: str, where: str) -> Loop:
     """``loop`` if it is stable; an error that teaches if not."""
     growth = float(closed_loop(*loop)[0].real)
     if growth < 0.0 and np.all(np.isfinite(loop[2])):
@@ -121,7 +135,7 @@ def _heading(linear: LinearModel, speed: float, length: float, lag: float, range
         control=CONTROL_SHARE * range_,
         start=np.array([0.1 * speed, 0.1 * speed / length, HEADING_ERROR, 0.1, 0.1 * HEADING_ERROR * patience]),
     )
-    return _require((full, outputs, output_feedback(full, outputs, weights)), "heading", _at(speed))
+    return require_stable((full, outputs, output_feedback(full, outputs, weights)), "heading", _at(speed))
 
 
 def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_: float) -> tuple[Loop, Loop]:
@@ -133,14 +147,14 @@ def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_:
         control=CONTROL_SHARE * range_,
         start=np.array([0.1 * speed, 0.1 * speed / length, PITCH_ERROR, 0.1]),
     )
-    pitch = _require((inner, attitude, output_feedback(inner, attitude, pitch_weights)), "pitch", _at(speed))
+    pitch = require_stable((inner, attitude, output_feedback(inner, attitude, pitch_weights)), "pitch", _at(speed))
     whole = with_servo(block(linear, ("w", "q", "theta", "z"), "elevator"), lag)
     sinking = whole.A[3]
     whole = with_integral(whole, np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
     k_q, k_theta = pitch[2]
     k = np.array([0.0, k_q, k_theta, 0.0, 0.0, 0.0])
     # What the depth loop steers is the craft with its pitch loop closed; its control is the pitch asked for.
-    order = _pitch_order(pitch)
+    order = steady_pitch_order(pitch)
     held = Plant(whole.A - whole.B @ k[None, :], whole.B * order, whole.states)
     outputs = np.vstack([[*sinking, 0.0], np.eye(6)[[3, 5]]])
     patience = INTEGRAL_LENGTHS * length / speed
@@ -153,10 +167,10 @@ def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_:
     outer = output_feedback(held, outputs, weights)
     both = np.vstack([np.eye(6)[[1, 2]], outputs])
     depth = (whole, both, np.array([k_q, k_theta, *(order * outer)]))
-    return pitch, _require(depth, "depth", _at(speed))
+    return pitch, require_stable(depth, "depth", _at(speed))
 
 
-def _pitch_order(pitch: Loop) -> float:
+def steady_pitch_order(pitch: Loop) -> float:
     """Elevator per pitch asked for [-] that makes the pitch follow it in the steady state.
 
     Source     Steady gain of the closed pitch loop.
@@ -182,7 +196,7 @@ def _roll(linear: LinearModel, speed: float, length: float, lag: float, range_: 
     return full, outputs, gains if stable else np.zeros(2)
 
 
-def _reversal(model: Model, speed: float) -> float:
+def reversal_below(model: Model, speed: float) -> float:
     """Speed [m/s] below which the elevator acts reversed on depth; 0 if there is none below ``speed``.
 
     A pilot for less than the inversion speed is designed for the reversed elevator and has no order to hold back.
@@ -205,7 +219,8 @@ def elevator_authority(linear: LinearModel, speed: float) -> float:
     return float(steady[0] - speed * steady[2])
 
 
-def _notes(linear: LinearModel, loops: Mapping[str, Loop], speed: float) -> tuple[str, ...]:
+def notes_of(linear: LinearModel, loops: Mapping[str, Loop], speed: float) -> tuple[str, ...]:
+    """What a pilot of these ``loops`` cannot do at ``speed`` [m/s], in words."""
     out = []
     if elevator_authority(linear, speed) < 0.0:
         out.append(
