@@ -54,7 +54,7 @@ def slopes_of_the_law(model, pilot):
 
 
 def optimal(model, pilot, plane):
-    """A, B, K of the design, with K from a Riccati equation set up here: Bryson's weights on the states and the fins."""
+    """A, B, K of the design, with K from a Riccati equation set up here: Bryson on states and fins."""
     states, control, held = PLANES[plane]
     linear, length = linearise(model, pilot.speed), model.craft.length
     part = linear.part(states, (control,))

@@ -15,6 +15,7 @@ from towtank.frames import Array
 from towtank.model.algebra import MATH
 from towtank.model.equations import Model
 from towtank.model.linear import LinearModel, linearise
+from towtank.pilot.feedback import steady_gain
 from towtank.pilot.law import Pilot, authority, schedule
 
 COMMANDS = ("rudder", "elevator", "aileron")
@@ -24,6 +25,9 @@ STATES = ("z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r")
 TRIMS = ("trim_rudder", "trim_elevator")
 ORDER = 3
 """Order of the Pade approximant of a delay T; its phase is off by 1e-5 rad at 1 / T and by 5e-3 rad at 2.5 / T."""
+
+POINTS = 80
+"""Frequencies in a decade."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +57,24 @@ class WholeLoop:
         n = len(self.A)
         return np.asarray(self.K @ np.linalg.solve(1j * frequency[:, None, None] * np.eye(n) - self.A, self.B + 0j))
 
+    def steady(self, at: int) -> float:
+        """Gain of the loop cut at command ``at`` at frequency zero; infinity, unsigned, for a loop that integrates."""
+        return steady_gain(*self.cut(at))
+
     @property
     def frequencies(self) -> Array:
-        """Frequencies (m,) [rad/s] that cover the modes with all loops closed, a decade beyond either side."""
-        size = np.abs(self.eigenvalues)
+        """Frequencies (m,) [rad/s] from a decade below the slowest mode to one above the fastest, denser at resonances.
+
+        Modes are those with all loops closed and all open.
+        """
+        modes = np.concatenate([self.eigenvalues, np.linalg.eigvals(self.A)])
+        size = np.abs(modes)
         size = size[size > 1e-6 * size.max()]
         low, high = np.log10(size.min()) - 1.0, np.log10(size.max()) + 1.0
-        return np.logspace(low, high, int(80 * (high - low)))
+        even = np.logspace(low, high, int(POINTS * (high - low)))
+        near = np.abs(modes.imag)[:, None] + np.abs(modes.real)[:, None] * np.linspace(-4.0, 4.0, POINTS // 2)
+        near = near[(np.abs(modes.imag) > 0.0)[:, None] & (near > even[0]) & (near < even[-1])]
+        return np.unique(np.concatenate([even, near]))
 
 
 def whole_loop(model: Model, pilot: Pilot, speed: float | None = None, *, delay: float = 0.0) -> WholeLoop:
