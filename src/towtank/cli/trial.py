@@ -10,6 +10,7 @@ import typer
 
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
+from towtank.cli.pilots import PilotWord, flown_by, named_after
 from towtank.cli.reply import Reply, answering
 from towtank.errors import InputError
 
@@ -77,6 +78,7 @@ def trial(
     legs: Legs = None,
     leg_length: LegLength = None,
     spacing: Spacing = None,
+    pilot: PilotWord = None,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -94,7 +96,9 @@ def trial(
 
         chosen = _parameters(kind, {name: value for name, value in given.items() if value is not None})
         chain = open_chain(reply, craft, out).keep_speed()
-        trajectory: Trajectory = getattr(towtank, kind.name.lower())(chain.model(), **chosen)
+        flown, model = getattr(towtank, kind.name.lower()), chain.model()
+        chosen |= flown_by(flown, pilot, model, chosen)
+        trajectory: Trajectory = named_after(flown(model, **chosen), pilot)
         chain.add_trial(trajectory)
         reply.file("trial", chain.study.trials / f"{trajectory.name}.nc")
         _tell(reply, trajectory)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from towtank.errors import InputError, TrialError
-from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.model.linear import LinearModel, elevator_reversal_speed, linearise
 from towtank.pilot.feedback import Weights, closed_loop, margins, output_feedback
 from towtank.pilot.law import Pilot
-from towtank.pilot.plant import Plant, block, with_integral, with_servo
+from towtank.pilot.plant import Loop, Plant, block, with_integral, with_servo
 
 HEADING_ERROR = np.radians(20.0)
 PITCH_ERROR = np.radians(10.0)
@@ -28,9 +25,6 @@ PITCH_LIMIT = np.radians(15.0)
 """Largest pitch asked for, from the trimmed pitch; LAUV practice is 10 to 15 deg."""
 TURN_RADIUS = 4.0
 """Radius, in lengths, of the tightest turn asked for."""
-
-Loop = tuple[Plant, Array, Array]
-"""Plant, outputs (m, n), gains (m,)."""
 
 
 def design_pilot(model: Model, speed: float | None = None) -> Pilot:
@@ -90,7 +84,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
             "depth": margins(*depth),
             **({"roll": margins(*roll)} if np.any(roll[2]) else {}),
         },
-        notes=notes_of(linear, loops, speed),
+        notes=notes_of(linear, bool(np.any(roll[2])), speed),
     )
 
 
@@ -114,15 +108,21 @@ def speed_of(model: Model, speed: float | None) -> float:
     return speed
 
 
-def require_stable(loop: Loop, name: str, where: str) -> Loop:
+def unstable(name: str, speed: float, growth: float = float("nan")) -> TrialError:
+    """The error of a loop called ``name`` that no gains stabilise at ``speed`` [m/s]; ``growth`` [1/s]."""
+    return TrialError(
+        f"pilot of this craft at {speed:g} m/s: no gains stabilise {name} (largest eigenvalue {growth:+.3g} 1/s). The "
+        "fins are too weak or too slow for this craft, or act the wrong way: look at Nuudr, Muude, the fins' lag and "
+        "the stability indices."
+    )
+
+
+def _stable(loop: Loop, name: str, speed: float) -> Loop:
     """``loop`` if it is stable; an error that teaches if not."""
     growth = float(closed_loop(*loop)[0].real)
     if growth < 0.0 and np.all(np.isfinite(loop[2])):
         return loop
-    raise TrialError(
-        f"pilot of {where}: no gains stabilise {name} (largest eigenvalue {growth:+.3g} 1/s). The fins are too weak or "
-        "too slow for this craft, or act the wrong way: look at Nuudr, Muude, the fins' lag and the stability indices."
-    )
+    raise unstable(name, speed, growth)
 
 
 def _heading(linear: LinearModel, speed: float, length: float, lag: float, range_: float) -> Loop:
@@ -135,7 +135,7 @@ def _heading(linear: LinearModel, speed: float, length: float, lag: float, range
         control=CONTROL_SHARE * range_,
         start=np.array([0.1 * speed, 0.1 * speed / length, HEADING_ERROR, 0.1, 0.1 * HEADING_ERROR * patience]),
     )
-    return require_stable((full, outputs, output_feedback(full, outputs, weights)), "heading", _at(speed))
+    return _stable((full, outputs, output_feedback(full, outputs, weights)), "heading", speed)
 
 
 def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_: float) -> tuple[Loop, Loop]:
@@ -147,7 +147,7 @@ def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_:
         control=CONTROL_SHARE * range_,
         start=np.array([0.1 * speed, 0.1 * speed / length, PITCH_ERROR, 0.1]),
     )
-    pitch = require_stable((inner, attitude, output_feedback(inner, attitude, pitch_weights)), "pitch", _at(speed))
+    pitch = _stable((inner, attitude, output_feedback(inner, attitude, pitch_weights)), "pitch", speed)
     whole = with_servo(block(linear, ("w", "q", "theta", "z"), "elevator"), lag)
     sinking = whole.A[3]
     whole = with_integral(whole, np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
@@ -167,7 +167,7 @@ def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_:
     outer = output_feedback(held, outputs, weights)
     both = np.vstack([np.eye(6)[[1, 2]], outputs])
     depth = (whole, both, np.array([k_q, k_theta, *(order * outer)]))
-    return pitch, require_stable(depth, "depth", _at(speed))
+    return pitch, _stable(depth, "depth", speed)
 
 
 def steady_pitch_order(pitch: Loop) -> float:
@@ -205,10 +205,6 @@ def reversal_below(model: Model, speed: float) -> float:
     return found if found < speed else 0.0
 
 
-def _at(speed: float) -> str:
-    return f"this craft at {speed:g} m/s"
-
-
 def elevator_authority(linear: LinearModel, speed: float) -> float:
     """Steady rate of depth per elevator angle, zdot / delta_e [m/s per rad]; negative where the elevator acts reversed.
 
@@ -219,14 +215,14 @@ def elevator_authority(linear: LinearModel, speed: float) -> float:
     return float(steady[0] - speed * steady[2])
 
 
-def notes_of(linear: LinearModel, loops: Mapping[str, Loop], speed: float) -> tuple[str, ...]:
-    """What a pilot of these ``loops`` cannot do at ``speed`` [m/s], in words."""
+def notes_of(linear: LinearModel, rolls: bool, speed: float) -> tuple[str, ...]:
+    """What a pilot cannot do at ``speed`` [m/s], in words; ``rolls`` : it damps roll."""
     out = []
     if elevator_authority(linear, speed) < 0.0:
         out.append(
             f"At {speed:g} m/s the elevator acts reversed on depth: the speed is below the inversion speed, where the "
             "restoring moment outweighs the fins. The pilot is designed for it and must not be used above that speed."
         )
-    if not np.any(loops["roll"][2]):
+    if not rolls:
         out.append("The fins give no useful roll moment: roll is left to the righting moment.")
     return tuple(out)

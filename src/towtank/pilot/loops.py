@@ -1,8 +1,8 @@
-"""The whole linear loop of a craft under a pilot: all states together, with fins' lag, trims and delay."""
+"""The linear loops of a craft under any pilot: plane by plane, and all states together with trims and delay."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial
 
 import numpy as np
@@ -15,14 +15,14 @@ from towtank.frames import Array
 from towtank.model.algebra import MATH
 from towtank.model.equations import Model
 from towtank.model.linear import LinearModel, linearise
-from towtank.pilot.feedback import steady_gain
+from towtank.pilot.feedback import closed_loop, margins, steady_gain
 from towtank.pilot.law import Pilot, authority, schedule
+from towtank.pilot.plant import Loop, block, with_integral, with_servo
 
 COMMANDS = ("rudder", "elevator", "aileron")
 """Where the loop is cut: the commands of the pilot."""
 STATES = ("z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r")
 """States of the craft in the loop; x and y are not fed back while a heading is held."""
-TRIMS = ("trim_rudder", "trim_elevator")
 ORDER = 3
 """Order of the Pade approximant of a delay T; its phase is off by 1e-5 rad at 1 / T and by 5e-3 rad at 2.5 / T."""
 
@@ -95,14 +95,67 @@ def whole_loop(model: Model, pilot: Pilot, speed: float | None = None, *, delay:
         A speed that is not positive, a negative delay, or a craft without fins.
     """
     speed = pilot.speed if speed is None else float(speed)
-    if not model.craft.fins or not delay >= 0.0:
-        raise InputError(
-            f"loop of {model.craft.name}: {len(model.craft.fins)} fins, a delay of {delay:g} s. A pilot needs fins, "
-            "and a delay is zero or more."
-        )
-    linear = linearise(model, speed)
-    lag = max(float(fin.time_constant) for fin in model.craft.fins)
+    if not delay >= 0.0:
+        raise InputError(f"loop of {model.craft.name}: a delay of {delay:g} s. A delay is zero or more.")
+    lag, linear = _lag(model), linearise(model, speed)
     return lagged(linear.part(STATES, COMMANDS), *law_of(pilot, linear), lag, delay)
+
+
+PLANES = {
+    "heading": (("v", "r", "psi"), 0, 0),
+    "pitch": (("w", "q", "theta"), 1, None),
+    "depth": (("w", "q", "theta", "z"), 1, 1),
+    "roll": (("p", "phi"), 2, None),
+}
+"""Loop -> states, command in ``COMMANDS``, trim (0 of the rudder, 1 of the elevator) that integrates the last state."""
+
+
+def judged(model: Model, pilot: Pilot) -> Pilot:
+    """``pilot`` with the eigenvalues and margins of its loops on ``model`` at its own speed, plane by plane.
+
+    The loops are those of ``design_pilot``: with the fins' lag, without what couples the planes. A pilot with a loop
+    that is not stable gets a note that says so.
+
+    Raises
+    ------
+    InputError
+        The craft has no fins.
+    """
+    loops = planes(model, pilot)
+    values = {name: tuple(complex(s) for s in closed_loop(*loop)) for name, loop in loops.items() if name != "pitch"}
+    bad = [name for name, found in values.items() if not found[0].real < 0.0]
+    notes = tuple(
+        f"Not stable on {model.craft.name} at {pilot.speed:g} m/s in {name}: largest eigenvalue "
+        f"{values[name][0].real:+.3g} 1/s."
+        for name in bad
+    )
+    held = {name: margins(*loop) for name, loop in loops.items() if name not in bad and np.any(loop[2])}
+    kept = (note for note in pilot.notes if not note.startswith("Not stable on "))
+    return replace(pilot, eigenvalues=values, margins=held, notes=(*kept, *notes))
+
+
+def planes(model: Model, pilot: Pilot) -> dict[str, Loop]:
+    """The loops of ``pilot`` at its own speed, plane by plane, in the order of ``PLANES``."""
+    linear, lag = linearise(model, pilot.speed), _lag(model)
+    G, J = law_of(pilot, linear)
+    loops: dict[str, Loop] = {}
+    for name, (states, command, trim) in PLANES.items():
+        n, here = len(states), [STATES.index(state) for state in states]
+        plant, outputs, gains = with_servo(block(linear, states, COMMANDS[command]), lag), np.eye(n + 1)[:n], G[command]
+        gains = gains[here]
+        if name == "pitch":
+            gains = np.array([pilot.heave, pilot.pitch_rate, pilot.pitch]) * float(schedule(pilot, pilot.speed, MATH))
+        if trim is not None and J[trim].any():
+            plant, gains = with_integral(plant, outputs[-1]), np.append(gains, J[trim, here[-1]])
+            outputs = np.eye(n + 2)[[*range(n), n + 1]]
+        loops[name] = (plant, outputs, gains)
+    return loops
+
+
+def _lag(model: Model) -> float:
+    if not model.craft.fins:
+        raise InputError(f"craft {model.craft.name} has no fins, so no pilot can steer it. Fly it in open loop.")
+    return max(float(fin.time_constant) for fin in model.craft.fins)
 
 
 def law_of(pilot: Pilot, linear: LinearModel) -> tuple[Array, Array]:
@@ -127,13 +180,17 @@ def law_of(pilot: Pilot, linear: LinearModel) -> tuple[Array, Array]:
 
 
 def lagged(linear: LinearModel, G: Array, J: Array, lag: float, delay: float) -> WholeLoop:
-    """The loop of a linear craft with the ``lag`` [s] of its fins, the trims of a law (G, J) and a ``delay`` [s]."""
-    n, m, t = len(linear.states), len(COMMANDS), len(TRIMS)
+    """The loop of a linear craft with the ``lag`` [s] of its fins, the trims of a law (G, J) and a ``delay`` [s].
+
+    A trim that integrates nothing is no state.
+    """
+    used = np.flatnonzero(J.any(axis=1))
+    n, m, t = len(linear.states), len(COMMANDS), len(used)
     A, B = np.zeros((n + m + t, n + m + t)), np.zeros((n + m + t, m))
     A[:n, :n], A[:n, n : n + m] = linear.A, linear.B
     A[n : n + m, n : n + m], B[n : n + m] = -np.eye(m) / lag, np.eye(m) / lag
-    A[n + m :, :n] = -J
-    K = np.hstack([G, np.zeros((m, m)), -np.eye(m)[:, :t]])
+    A[n + m :, :n] = -J[used]
+    K = np.hstack([G, np.zeros((m, m)), -np.eye(m)[:, used]])
     if delay == 0.0:
         return WholeLoop(A, B, K)
     parts = delayed(delay)

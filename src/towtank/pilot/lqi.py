@@ -21,16 +21,15 @@ from towtank.pilot.design import (
     PITCH_LIMIT,
     ROLL_ERROR,
     TURN_RADIUS,
-    Loop,
     notes_of,
-    require_stable,
     reversal_below,
     speed_of,
     steady_pitch_order,
+    unstable,
 )
-from towtank.pilot.feedback import closed_loop, margins
 from towtank.pilot.law import Pilot
-from towtank.pilot.plant import Plant, block, with_integral, with_servo
+from towtank.pilot.loops import judged
+from towtank.pilot.plant import block, with_integral
 
 MEASURED = "Feeds back sway and heave through the water: the craft must measure or estimate them."
 
@@ -97,28 +96,24 @@ def design_lqi(model: Model, speed: float | None = None, weights: LqiWeights = W
     speed = speed_of(model, speed)
     linear, length = linearise(model, speed), model.craft.length
     control = weights.control * min(float(fin.max_angle) for fin in model.craft.fins)
-    lag = max(float(fin.time_constant) for fin in model.craft.fins)
-    patience, far, at = weights.integral * length / speed, weights.depth * length, f"this craft at {speed:g} m/s"
-    free = np.inf
+    patience, far, free = weights.integral * length / speed, weights.depth * length, np.inf
     yaw = np.array([free, free, weights.heading, weights.heading * patience])
     dive = np.array([free, free, weights.pitch, far, far * patience])
     heading = regulator(linear, ("v", "r", "psi"), "rudder", yaw, control)
     depth = regulator(linear, ("w", "q", "theta", "z"), "elevator", dive, control)
-    loops: dict[str, Loop] = {
-        "heading": require_stable(_lagged(linear, ("v", "r", "psi"), "rudder", lag, heading), "heading", at),
-        "depth": require_stable(_lagged(linear, ("w", "q", "theta", "z"), "elevator", lag, depth), "depth", at),
-    }
-    roll = _roll(linear, weights.roll, control)
-    loops["roll"] = _lagged(linear, ("p", "phi"), "aileron", lag, roll)
+    for name, gains in (("heading", heading), ("depth", depth)):
+        if not np.any(gains):
+            raise unstable(name, speed)
     inner = (block(linear, ("w", "q", "theta"), "elevator"), np.eye(3), depth[:3])
     order = steady_pitch_order(inner)
     if not (heading[2] / heading[1] > 0.0 and np.isfinite(order) and abs(order) > 0.0):
         raise TrialError(
-            f"pilot of {at}: the regulator's gains of yaw rate {heading[1]:.3g} s and heading {heading[2]:.3g} have "
-            "opposite signs, which the law's limit of turn cannot take. Allow a smaller heading error, or use "
-            "design_pilot."
+            f"pilot of {model.craft.name} at {speed:g} m/s: the regulator's gains of yaw rate {heading[1]:.3g} s and "
+            f"heading {heading[2]:.3g} have opposite signs, which the law's limit of turn cannot take. Allow a smaller "
+            "heading error, or use design_pilot."
         )
-    return Pilot(
+    roll = _roll(linear, weights.roll, control)
+    pilot = judged(model, Pilot(
         craft=model.craft.name, speed=speed,
         sway=float(heading[0]), yaw_rate=float(heading[1]), heading=float(heading[2] / heading[1]),
         heading_integral=float(heading[3]), turn_limit=speed / (TURN_RADIUS * length),
@@ -126,10 +121,12 @@ def design_lqi(model: Model, speed: float | None = None, weights: LqiWeights = W
         depth=float(-depth[3] / order), depth_integral=float(depth[4]), pitch_limit=float(PITCH_LIMIT),
         roll_rate=float(roll[0]), roll=float(roll[1]), unwind=2.0 * length / speed,
         heading_band=weights.heading * BAND_SHARE, depth_band=far * BAND_SHARE, reversal=reversal_below(model, speed),
-        eigenvalues={name: tuple(complex(s) for s in closed_loop(*loop)) for name, loop in loops.items()},
-        margins={name: margins(*loop) for name, loop in loops.items() if np.any(loop[2])},
-        notes=(*notes_of(linear, loops, speed), MEASURED),
-    )  # fmt: skip
+        notes=(*notes_of(linear, bool(np.any(roll)), speed), MEASURED),
+    ))  # fmt: skip
+    for name, values in pilot.eigenvalues.items():
+        if not values[0].real < 0.0:
+            raise unstable(name, speed, values[0].real)
+    return pilot
 
 
 def regulator(linear: LinearModel, states: tuple[str, ...], control: str, largest: Array, limit: float) -> Array:
@@ -148,17 +145,6 @@ def regulator(linear: LinearModel, states: tuple[str, ...], control: str, larges
     except (LinAlgError, ValueError):
         return np.zeros(len(largest))
     return np.asarray((plant.B.T @ P / R)[0])
-
-
-def _lagged(linear: LinearModel, states: tuple[str, ...], control: str, lag: float, gains: Array) -> Loop:
-    """The loop of ``gains`` with the lag of the fins in it, which they do not feed back."""
-    n = len(states)
-    plant = with_servo(block(linear, states, control), lag)
-    seen = np.eye(n + 1)[:n]
-    if len(gains) == n:
-        return plant, seen, gains
-    whole: Plant = with_integral(plant, seen[-1])
-    return whole, np.eye(n + 2)[[*range(n), n + 1]], gains
 
 
 def _roll(linear: LinearModel, largest: float, limit: float) -> Array:

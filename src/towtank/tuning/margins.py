@@ -79,7 +79,7 @@ def robust_margins(
 ) -> RobustMargins:
     """Margins of ``pilot`` on ``model`` at ``speed`` [m/s], the pilot's own when not given; all planes coupled.
 
-    delay [s] : in each command; half the control period of the engine when not given, because a command is held over it.
+    delay [s] : in each command; half the control period of the engine when not given, for a held command.
 
     Source     python-control: ``stability_margins``, ``disk_margins`` (seiler2020).
     Departure  The margin of all loops together takes the structured singular value from scaled norms

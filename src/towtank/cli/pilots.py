@@ -1,0 +1,80 @@
+"""``--pilot``: a design, the gains of a vehicle, or a pilot.json."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from towtank.errors import InputError
+
+if TYPE_CHECKING:
+    from towtank.model.equations import Model
+    from towtank.pilot.law import Pilot
+    from towtank.trials.trajectory import Trajectory
+
+PilotWord = Annotated[
+    str | None,
+    typer.Option(
+        "--pilot", metavar="NAME|FILE", show_default=False,
+        help="Who steers: cascade (default), lqi, a vehicle's gains such as lauv-marie-2026, or a pilot.json.",
+    ),
+]  # fmt: skip
+
+
+def pilot_of(word: str, model: Model, speed: float) -> Pilot:
+    """The pilot called ``word`` for ``model`` at ``speed`` [m/s].
+
+    Raises
+    ------
+    InputError
+        Neither a file nor a name.
+    """
+    from towtank.pilot.design import design_pilot
+    from towtank.pilot.files import read_pilot
+    from towtank.pilot.lqi import design_lqi
+    from towtank.pilot.vehicles import load_pilot, vehicles
+
+    designs: dict[str, Callable[[Model, float], Pilot]] = {"cascade": design_pilot, "lqi": design_lqi}
+    if Path(word).is_file():
+        return read_pilot(word)
+    if word in designs:
+        return designs[word](model, speed)
+    shelf = vehicles()
+    if word in shelf:
+        return load_pilot(word, model, speed)
+    raise InputError(
+        f"--pilot {word}: neither a file nor a name. Give cascade, lqi, {', '.join(shelf)}, or a pilot.json."
+    )
+
+
+def flown_by(trial: Callable[..., Any], word: str | None, model: Model, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of ``trial`` that let the pilot called ``word`` fly it, none without a word.
+
+    With a pilot, the rudder or elevator of a trial in open loop is as ordered and the pilot holds the rest.
+
+    given : what the trial's function is called with.
+
+    Raises
+    ------
+    InputError
+        A trial that no pilot flies, or no such pilot.
+    """
+    from towtank.quantity import si
+
+    if word is None:
+        return {}
+    takes = inspect.signature(trial).parameters
+    if "pilot" not in takes:
+        raise InputError("--pilot: this trial is flown without a pilot. Leave it out.")
+    speed = model.craft.speed if given.get("speed") is None else si(given["speed"], "m/s", "--speed")
+    return {"pilot": pilot_of(word, model, speed)} | ({"hold_depth": True} if "hold_depth" in takes else {})
+
+
+def named_after(trajectory: Trajectory, word: str | None) -> Trajectory:
+    """``trajectory`` with the pilot in its name, so that trials of several pilots stand side by side in a study."""
+    return replace(trajectory, name=f"{trajectory.name}-{Path(word).stem}") if word else trajectory
