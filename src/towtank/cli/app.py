@@ -23,6 +23,7 @@ from towtank.cli.status import status
 from towtank.cli.sweep import sweep
 from towtank.cli.tow import tow
 from towtank.cli.trial import trial
+from towtank.cli.tune import tune
 from towtank.provenance import VERSION
 
 app = typer.Typer(
@@ -64,6 +65,7 @@ for _command in (
     grid,
     derive,
     trial,
+    tune,
     mc,
     assess,
     sweep,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,9 +13,11 @@ import typer
 from towtank.errors import InputError
 
 if TYPE_CHECKING:
+    from towtank.cli.reply import Reply
     from towtank.model.equations import Model
     from towtank.pilot.law import Pilot
     from towtank.trials.trajectory import Trajectory
+    from towtank.tuning.margins import RobustMargins
 
 PilotWord = Annotated[
     str | None,
@@ -78,3 +80,40 @@ def flown_by(trial: Callable[..., Any], word: str | None, model: Model, given: M
 def named_after(trajectory: Trajectory, word: str | None) -> Trajectory:
     """``trajectory`` with the pilot in its name, so that trials of several pilots stand side by side in a study."""
     return replace(trajectory, name=f"{trajectory.name}-{Path(word).stem}") if word else trajectory
+
+
+def speeds_of(text: str | None) -> tuple[float, ...]:
+    """Speeds [m/s] of a list such as ``"1 m/s,2 m/s"``; none of no text.
+
+    Raises
+    ------
+    InputError
+        Not a list of speeds above zero.
+    """
+    from towtank.quantity import si
+
+    speeds = tuple(si(part.strip(), "m/s", "--speeds") for part in (text or "").split(",") if part.strip())
+    if text is not None and not (speeds and min(speeds) > 0.0):
+        raise InputError(f'--speeds {text}: give one speed or more, above zero, such as "1 m/s,1.5 m/s".')
+    return tuple(sorted(speeds))
+
+
+def afloat(model: Model, speeds: Sequence[float], reply: Reply) -> Model:
+    """``model``, ballasted to neutral where it cannot be flown level at all of ``speeds`` [m/s], as in its trials."""
+    from towtank.trials.start import ballasted, level_trim
+
+    trims = [level_trim(model, speed) for speed in speeds]
+    if all(trim.holds for trim in trims) or not model.craft.fins:
+        return model
+    reply.log(f"ballasted to neutral: {next(trim.why for trim in trims if not trim.holds)}")
+    return ballasted(model)
+
+
+def in_words(margins: RobustMargins | None) -> str:
+    """Margins in a line; None is a loop that is not stable."""
+    from math import degrees
+
+    if margins is None:
+        return "not stable"
+    disk = margins.together.alpha
+    return f"gain x{margins.gain:.2f}, phase {degrees(margins.phase):.0f} deg, disk of all loops {disk:.2f}"

@@ -31,8 +31,10 @@ _LATER = ("sway", "heave", "scheduled")
 _MARGINS = ("largest_gain_factor", "smallest_gain_factor", "phase_margin")
 
 
-def write_pilot(pilot: Pilot, path: str | Path) -> Path:
+def write_pilot(pilot: Pilot, path: str | Path, inputs: Mapping[str, str] | None = None) -> Path:
     """Write ``pilot`` as JSON, schema ``towtank/pilot/1``; SI units, radians. A margin without limit is null.
+
+    inputs : name -> hash of what the gains were made from.
 
     Raises
     ------
@@ -47,7 +49,7 @@ def write_pilot(pilot: Pilot, path: str | Path) -> Path:
         "margins": {loop: dict(zip(_MARGINS, values, strict=True)) for loop, values in pilot.margins.items()},
         "sensors": asdict(pilot.sensors),
         "notes": list(pilot.notes),
-        "provenance": provenance(),
+        "provenance": provenance(inputs),
     }
     return write_json(Path(path), document)
 
