@@ -178,8 +178,9 @@ def test_no_rounds_only_score_the_start(craft):
 def test_what_cannot_be_tuned_is_told(craft):
     with pytest.raises(InputError, match="Choose one step or more from heading-step, depth-step, both"):
         tune(craft, steps=("zigzag",))
-    with pytest.raises(InputError, match="elevator acts reversed"):
-        tune(craft, speeds=(0.5,))
+    for pilot, speed in ((design_pilot(craft), 0.5), (design_pilot(craft, 0.5), 2.0)):
+        with pytest.raises(InputError, match="acts reversed"):
+            tune(craft, pilot, speeds=(speed,))
     with pytest.raises(InputError, match="rounds"):
         tune(craft, speeds=(2.0,), rounds=-1)
     heavy = synthetic.model(synthetic.SUBOFF, speed=2.0, net_buoyancy=-8.0)

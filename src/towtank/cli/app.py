@@ -15,6 +15,7 @@ from towtank.cli.grid import grid
 from towtank.cli.imports import import_
 from towtank.cli.mc import mc
 from towtank.cli.new import new
+from towtank.cli.pilot import pilot
 from towtank.cli.plan import plan
 from towtank.cli.report import report
 from towtank.cli.run import run
@@ -65,6 +66,7 @@ for _command in (
     grid,
     derive,
     trial,
+    pilot,
     tune,
     mc,
     assess,

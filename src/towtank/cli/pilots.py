@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from towtank.errors import InputError
+from towtank.errors import InputError, TowtankError
 
 if TYPE_CHECKING:
     from towtank.cli.reply import Reply
@@ -36,14 +36,12 @@ def pilot_of(word: str, model: Model, speed: float) -> Pilot:
     InputError
         Neither a file nor a name.
     """
-    from towtank.pilot.design import design_pilot
-    from towtank.pilot.files import read_pilot
-    from towtank.pilot.lqi import design_lqi
+    from towtank.pilot.files import read_schedule
     from towtank.pilot.vehicles import load_pilot, vehicles
 
-    designs: dict[str, Callable[[Model, float], Pilot]] = {"cascade": design_pilot, "lqi": design_lqi}
+    designs = designs_of()
     if Path(word).is_file():
-        return read_pilot(word)
+        return read_schedule(word).at(speed)
     if word in designs:
         return designs[word](model, speed)
     shelf = vehicles()
@@ -52,6 +50,14 @@ def pilot_of(word: str, model: Model, speed: float) -> Pilot:
     raise InputError(
         f"--pilot {word}: neither a file nor a name. Give cascade, lqi, {', '.join(shelf)}, or a pilot.json."
     )
+
+
+def designs_of() -> dict[str, Callable[[Model, float], Pilot]]:
+    """Word -> design of a pilot for a model and a speed."""
+    from towtank.pilot.design import design_pilot
+    from towtank.pilot.lqi import design_lqi
+
+    return {"cascade": design_pilot, "lqi": design_lqi}
 
 
 def flown_by(trial: Callable[..., Any], word: str | None, model: Model, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -109,11 +115,25 @@ def afloat(model: Model, speeds: Sequence[float], reply: Reply) -> Model:
     return ballasted(model)
 
 
-def in_words(margins: RobustMargins | None) -> str:
+def in_words(margins: RobustMargins | str | None) -> str:
     """Margins in a line; None is a loop that is not stable."""
     from math import degrees
 
-    if margins is None:
-        return "not stable"
+    if margins is None or isinstance(margins, str):
+        return margins or "not stable"
     disk = margins.together.alpha
     return f"gain x{margins.gain:.2f}, phase {degrees(margins.phase):.0f} deg, disk of all loops {disk:.2f}"
+
+
+def margins_of(reply: Reply, model: Model, pilot: Pilot, speed: float) -> RobustMargins | str | None:
+    """Margins at ``speed`` [m/s]; None where the loop is not stable, words where python-control is missing."""
+    from towtank.errors import TrialError
+    from towtank.tuning.margins import robust_margins
+
+    try:
+        return robust_margins(model, pilot, speed)
+    except TrialError:
+        return None
+    except TowtankError as error:
+        reply.log(str(error))
+        return "margins not known"

@@ -17,6 +17,7 @@ from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.algebra import MATH
 from towtank.model.equations import Model
+from towtank.model.linear import elevator_reversal_speed
 from towtank.montecarlo.draw import draw
 from towtank.pilot.design import CONTROL_SHARE, DEPTH_ERROR, HEADING_ERROR, ROLL_ERROR
 from towtank.pilot.law import Pilot, schedule
@@ -131,12 +132,13 @@ def cases(
             f"tuning: steps {', '.join(steps) or 'none'} at {len(speeds)} speeds with {drawn} drawn craft. Choose one "
             f"step or more from {', '.join(STEPS)}, one speed or more, and zero drawn craft or more."
         )
+    turn = elevator_reversal_speed(model, "wide") or 0.0
     for speed in speeds:
-        if pilot.reversal > 0.0 and speed < 1.05 * pilot.reversal:
+        if (speed < 1.05 * turn) if pilot.speed > turn else (speed > turn):
             raise InputError(
-                f"tuning at {speed:g} m/s: this pilot follows depth from {1.05 * pilot.reversal:.3g} m/s on: the "
-                f"elevator acts reversed below {pilot.reversal:.3g} m/s. Give higher speeds, or a pilot designed for "
-                "lower ones."
+                f"tuning at {speed:g} m/s: below {turn:.3g} m/s the elevator of {model.craft.name} acts reversed, and "
+                f"this pilot is for {pilot.speed:g} m/s. One for above follows depth from {1.05 * turn:.3g} m/s on, one "
+                "for below must stay below. Give speeds on the pilot's side, and tune one pilot for each side."
             )
     models = (model, *_drawn(model, drawn, seed))
     return tuple(
