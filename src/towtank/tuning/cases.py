@@ -137,8 +137,8 @@ def cases(
         if (speed < 1.05 * turn) if pilot.speed > turn else (speed > turn):
             raise InputError(
                 f"tuning at {speed:g} m/s: below {turn:.3g} m/s the elevator of {model.craft.name} acts reversed, and "
-                f"this pilot is for {pilot.speed:g} m/s. One for above follows depth from {1.05 * turn:.3g} m/s on, one "
-                "for below must stay below. Give speeds on the pilot's side, and tune one pilot for each side."
+                f"this pilot is for {pilot.speed:g} m/s. One for above follows depth from {1.05 * turn:.3g} m/s on, "
+                "one for below must stay below. Give speeds on the pilot's side, and tune one pilot for each side."
             )
     models = (model, *_drawn(model, drawn, seed))
     return tuple(
