@@ -47,7 +47,7 @@ def slopes_of_the_law(model, pilot):
     sink = x["w"] - pilot.speed * x["theta"]
     seen = Seen(**{n: x.get(n, 0.0) for n in Seen._fields if n != "sink"}, sink=sink)
     fins = allocation(model.craft)
-    out = steer(pilot, fins.rows, fins.limits, Orders(piloted=1.0, steer=1.0, dive=1.0), seen,
+    out = steer(pilot, fins, Orders(piloted=1.0, steer=1.0, dive=1.0), seen,
                 [x["trim_rudder"], x["trim_elevator"], 0.0], DUAL)  # fmt: skip
     slope = gradients([*out.granted, *out.memory_rates[:2]], len(names))
     return slope, names
@@ -133,12 +133,11 @@ def test_the_whole_loop_is_the_slope_of_the_text_that_is_flown():
         s = setting(model, 2.0, pilot)
         system = System(model.constants, s.pilot, s.thrust, (0.0, 0.0, 0.0), 0.25)
         ordered = [getattr(s.orders(steer=1.0, dive=1.0), name) for name in ORDERS]
-        mixing = allocation(model.craft)
 
-        def rates(y, system=system, ordered=ordered, mixing=mixing):
+        def rates(y, system=system, ordered=ordered):
             x, memory = list(y[:17]), list(y[17:])
             out = command(system, observe(system, x, ordered, MATH), memory, ordered, MATH)
-            return np.array([*dynamics(system, x, [*mixing.fins(out.granted), 1.0], MATH), *out.memory_rates])
+            return np.array([*dynamics(system, x, [*out.fins, 1.0], MATH), *out.memory_rates])
 
         step, start = 1e-6, at(s.state, s.memory)
         slope = np.array([(rates(start + step * e) - rates(start - step * e)) / (2.0 * step) for e in np.eye(20)]).T

@@ -28,7 +28,7 @@ def craft():
 def asked(pilot, model, orders, memory=(0.0, 0.0, 0.0), **seen):
     fins = allocation(model.craft)
     eyes = Seen(**{name: seen.get(name, 1.7 if name == "u" else 0.0) for name in Seen._fields})
-    return steer(pilot, fins.rows, fins.limits, orders, eyes, memory, MATH)
+    return steer(pilot, fins, orders, eyes, memory, MATH)
 
 
 TORQUES = sorted(name for name, scheme in vehicles().items() if isinstance(scheme, TorqueCascade))

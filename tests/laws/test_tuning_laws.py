@@ -14,6 +14,7 @@ from towtank.errors import InputError, TrialError
 from towtank.pilot.design import design_pilot
 from towtank.pilot.files import read_pilot, write_pilot
 from towtank.pilot.lqi import design_lqi
+from towtank.pilot.sensors import TYPICAL
 from towtank.trials.start import setting
 from towtank.tuning.cases import ASKEW, SEEN, STEPS, cases
 from towtank.tuning.cost import LOST, Objective, Tie, price, residuals
@@ -78,6 +79,17 @@ def test_a_flight_begins_level_but_for_the_fins_that_stand_askew(craft, small):
     again = replace(small.start, pitch=1.3 * small.start.pitch, heave=0.7 * small.start.heave)
     case = small.cases[0]
     assert case.start(again)[-2] == pytest.approx(setting(craft, 2.0, again).memory[1] + ASKEW)
+
+
+def test_sensors_and_play_are_left_out_and_the_pilot_keeps_its_sensors(craft, small):
+    loose = tuple(replace(fin, backlash=np.radians(2.0), dead_band=np.radians(0.5)) for fin in craft.craft.fins)
+    pilot = replace(small.start, sensors=TYPICAL)
+    flown = cases(replace(craft, craft=replace(craft.craft, fins=loose)), pilot, (2.0,), ("both",), 0, 5)
+    assert (flown[0].fly(pilot) == small.cases[0].fly(small.start)).all()
+    assert small.pilot(np.zeros(len(small.names))).sensors == small.start.sensors
+    found = tune(craft, pilot, speeds=(2.0,), steps=("heading-step",), drawn=0, rounds=2)
+    assert found.pilot.sensors == TYPICAL
+    assert found.pilot != pilot
 
 
 def test_each_part_of_the_cost_is_one_where_its_size_is_reached(small):

@@ -23,7 +23,7 @@ Speeds = Annotated[
         help='Speeds of the trials, such as "1 m/s,1.5 m/s". Default: the craft\'s and 1.5 times it.',
     ),
 ]  # fmt: skip
-Steps = Annotated[str, typer.Option(metavar="LIST", help="Trials: heading-step, depth-step, both (at once).")]
+Steps = Annotated[str, typer.Option(metavar="LIST", help="Trials: heading-step, depth-step, both (at once), hard.")]
 Drawn = Annotated[int, typer.Option(metavar="N", min=0, help="Craft drawn from the uncertainty, beside the best one.")]
 Seed = Annotated[int, typer.Option(metavar="N", min=0, help="Of the draws.")]
 Rounds = Annotated[int, typer.Option(metavar="N", min=0, help="Most steps of the search; 0 only scores the start.")]

@@ -11,8 +11,8 @@ from typing import Any
 from towtank.artefact import read_json, write_json
 from towtank.errors import ArtefactError, InputError
 from towtank.pilot.law import GAINS, Pilot
-from towtank.pilot.sensors import Reading, Sensors
 from towtank.pilot.scheduled import PilotSchedule
+from towtank.pilot.sensors import Reading, Sensors
 from towtank.provenance import provenance
 
 SCHEMA, SCHEDULE = "towtank/pilot/1", "towtank/pilot-schedule/1"

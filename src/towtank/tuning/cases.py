@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from towtank.model.linear import elevator_reversal_speed
 from towtank.montecarlo.draw import draw
 from towtank.pilot.design import CONTROL_SHARE, DEPTH_ERROR, HEADING_ERROR, ROLL_ERROR
 from towtank.pilot.law import Pilot, schedule
+from towtank.pilot.sensors import EXACT
 from towtank.trials.start import Setting, setting
 
 SEEN = ("psi", "z", "phi")
@@ -47,8 +48,11 @@ STEPS: dict[str, Step] = {
     "heading-step": Step(np.radians(30.0), 0.0, 25.0),
     "depth-step": Step(0.0, 1.0 / 3.0, 45.0),
     "both": Step(np.radians(-20.0), -1.0 / 3.0, 45.0),
+    "hard": Step(np.radians(90.0), 1.0, 45.0),
 }
-"""Trials on offer: the standard steps, and one of both together."""
+"""Trials on offer: the standard steps, one of both together, and one of both that takes fins to their limits."""
+USUAL = ("heading-step", "depth-step", "both")
+"""Trials flown unless told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +94,9 @@ class Case:
         return factor * s.trim.pitch, factor * s.trim.w
 
     def fly(self, pilot: Pilot) -> Array:
-        """Channels (ticks, 3 + n) at the ends of the ticks; NaN after the motion ran away."""
+        """Channels (ticks, 3 + n) at the ends of the ticks, seen exactly; NaN after the motion ran away."""
         flown = fly(
-            self.model, self.start(pilot), [self.leg], thrust=self.setting.thrust, pilot=pilot,
+            self.model, self.start(pilot), [self.leg], thrust=self.setting.thrust, pilot=replace(pilot, sensors=EXACT),
             clock=self.record.clock, log=Log(self.channels), threads=1,
         )  # fmt: skip
         return np.asarray(flown.log[0, 1:])
@@ -121,6 +125,8 @@ def cases(
 ) -> tuple[Case, ...]:
     """All flights: every step at every speed [m/s], of the best estimate and of ``drawn`` craft.
 
+    The fins have neither dead band nor play, and the pilot sees exactly.
+
     Raises
     ------
     InputError
@@ -140,7 +146,10 @@ def cases(
                 f"this pilot is for {pilot.speed:g} m/s. One for above follows depth from {1.05 * turn:.3g} m/s on, "
                 "one for below must stay below. Give speeds on the pilot's side, and tune one pilot for each side."
             )
-    models = (model, *_drawn(model, drawn, seed))
+    # A command that stays unanswered has no slope.
+    fins = tuple(replace(fin, dead_band=0.0, backlash=0.0) for fin in model.craft.fins)
+    smooth = replace(model, craft=replace(model.craft, fins=fins))
+    models = (smooth, *_drawn(smooth, drawn, seed))
     return tuple(
         _case(name, speed, i, one, pilot) for speed in speeds for name in steps for i, one in enumerate(models)
     )

@@ -19,7 +19,7 @@ from towtank.pilot.law import Pilot
 from towtank.pilot.loops import judged
 from towtank.pilot.plant import block
 from towtank.progress import Progress, Silent
-from towtank.tuning.cases import STEPS, Case, cases
+from towtank.tuning.cases import USUAL, Case, cases
 from towtank.tuning.cost import LOST, REST, Objective, Price, Tie, price
 from towtank.tuning.fence import ALPHA, Fence, plane
 from towtank.tuning.margins import RobustMargins, robust_margins
@@ -99,7 +99,7 @@ class Tuned:
 
 def tune(
     model: Model, pilot: Pilot | None = None, *, speeds: Sequence[float] | None = None,
-    steps: Sequence[str] = tuple(STEPS), drawn: int = 3, seed: int = 20, rounds: int = ROUNDS, threads: int = 1,
+    steps: Sequence[str] = USUAL, drawn: int = 3, seed: int = 20, rounds: int = ROUNDS, threads: int = 1,
     progress: Progress | None = None,
 ) -> Tuned:  # fmt: skip
     """Gains of least cost on ``model``, from those of ``pilot``, the cascade designed for it when not given.
