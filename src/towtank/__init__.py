@@ -27,6 +27,7 @@ _PUBLIC = {
     "ExtraLoad": "towtank.model.extra",
     "read_model": "towtank.model.files",
     "design_pilot": "towtank.pilot.design",
+    "design_lqi": "towtank.pilot.lqi",
     "read_pilot": "towtank.pilot.files",
     "Orders": "towtank.pilot.orders",
     "fly": "towtank.engine.run",

@@ -16,6 +16,7 @@ from towtank.cli.grid import grid
 from towtank.cli.imports import import_
 from towtank.cli.mc import mc
 from towtank.cli.new import new
+from towtank.cli.pilot import pilot
 from towtank.cli.plan import plan
 from towtank.cli.report import report
 from towtank.cli.run import run
@@ -24,6 +25,7 @@ from towtank.cli.status import status
 from towtank.cli.sweep import sweep
 from towtank.cli.tow import tow
 from towtank.cli.trial import trial
+from towtank.cli.tune import tune
 from towtank.provenance import VERSION
 
 app = typer.Typer(
@@ -65,6 +67,8 @@ for _command in (
     grid,
     derive,
     trial,
+    pilot,
+    tune,
     mc,
     faults,
     assess,

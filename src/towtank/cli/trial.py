@@ -11,6 +11,7 @@ import typer
 
 from towtank.cli.chain import open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
+from towtank.cli.pilots import PilotWord, flown_by, named_after
 from towtank.cli.reply import Reply, answering
 from towtank.errors import InputError
 
@@ -117,6 +118,7 @@ def trial(
     waypoint: Waypoints = None,
     current: Current = None,
     ballasted: Ballasted = False,
+    pilot: PilotWord = None,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -131,16 +133,17 @@ def trial(
         "leg_length": leg_length, "spacing": spacing, "waypoint": waypoint or None, "current": current,
     }  # fmt: skip
     with answering("trial", json, debug) as reply:
-        carry_out = _chosen(kind, {name: value for name, value in given.items() if value is not None})
+        carry_out = _chosen(kind, {name: value for name, value in given.items() if value is not None}, pilot)
         chain = open_chain(reply, craft, out).keep_speed()
         trajectory = _ballasted(chain.model(), carry_out) if ballasted else carry_out(chain.model())
+        trajectory = named_after(trajectory, pilot)
         chain.add_trial(trajectory)
         reply.file("trial", chain.study.trials / f"{trajectory.name}.nc")
         _tell(reply, trajectory)
 
 
-def _chosen(word: str, given: Mapping[str, Any]) -> Callable[[Model], Trajectory]:
-    """What makes the trial: a function of the package with its parameters, or a file.
+def _chosen(word: str, given: Mapping[str, Any], pilot: str | None) -> Callable[[Model], Trajectory]:
+    """What makes the trial: a function of the package with its parameters, or a file; ``pilot`` as for ``flown_by``.
 
     Raises
     ------
@@ -152,14 +155,18 @@ def _chosen(word: str, given: Mapping[str, Any]) -> Callable[[Model], Trajectory
     if word.endswith(".toml"):
         if given:
             raise InputError(f"{word} says all of its trial; it takes no --{next(iter(given)).replace('_', '-')}.")
-        return lambda model: towtank.trial_from_file(model, Path(word))
+        own = {"path": Path(word)}
+        return lambda model: towtank.trial_from_file(
+            model, **own, **flown_by(towtank.trial_from_file, pilot, model, own)
+        )
     if word not in list(Kind):
         raise InputError(f"{word!r} is no trial. Those are: {', '.join(Kind)}; or a file that ends in .toml.")
     kind = Kind(word)
     chosen = _parameters(kind, given)
     if kind is Kind.WAYPOINT_MISSION and "waypoints" not in chosen:
         raise InputError('a waypoint-mission needs points: --waypoint "200 m, 50 m", once for each.')
-    return lambda model: getattr(towtank, kind.name.lower())(model, **chosen)
+    flown = getattr(towtank, kind.name.lower())
+    return lambda model: flown(model, **chosen, **flown_by(flown, pilot, model, chosen))
 
 
 def _ballasted(model: Model, carry_out: Callable[[Model], Trajectory]) -> Trajectory:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from towtank.errors import InputError, TrialError
-from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.model.linear import LinearModel, elevator_reversal_speed, linearise
 from towtank.pilot.feedback import Weights, closed_loop, margins, output_feedback
 from towtank.pilot.law import Pilot
-from towtank.pilot.plant import Plant, block, with_integral, with_servo
+from towtank.pilot.plant import Loop, Plant, block, with_integral, with_servo
 
 HEADING_ERROR = np.radians(20.0)
 PITCH_ERROR = np.radians(10.0)
@@ -28,9 +25,6 @@ PITCH_LIMIT = np.radians(15.0)
 """Largest pitch asked for, from the trimmed pitch; LAUV practice is 10 to 15 deg."""
 TURN_RADIUS = 4.0
 """Radius, in lengths, of the tightest turn asked for."""
-
-Loop = tuple[Plant, Array, Array]
-"""Plant, outputs (m, n), gains (m,)."""
 
 
 def design_pilot(model: Model, speed: float | None = None) -> Pilot:
@@ -50,13 +44,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
     TrialError
         The craft has no fins, or its fins cannot stabilise heading or pitch.
     """
-    speed = model.craft.speed if speed is None else float(speed)
-    if not speed > 0.0 or not np.isfinite(speed):
-        raise InputError(
-            f"pilot of {model.craft.name}: speed {speed:g} m/s. Fins need forward speed; give a positive one."
-        )
-    if not model.craft.fins:
-        raise TrialError(f"craft {model.craft.name} has no fins, so no pilot can steer it. Run open-loop trials only.")
+    speed = speed_of(model, speed)
     linear = linearise(model, speed)
     range_ = min(float(fin.max_angle) for fin in model.craft.fins)
     lag = max(float(fin.time_constant) for fin in model.craft.fins)
@@ -66,7 +54,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
     roll = _roll(linear, speed, length, lag, range_)
     k_r, k_psi, k_i = heading[2]
     k_q, k_theta = pitch[2]
-    order = _pitch_order(pitch)
+    order = steady_pitch_order(pitch)
     k_h, k_z, k_zi = depth[2][2:] / order
     loops: dict[str, Loop] = {"heading": heading, "depth": depth, "roll": roll}
     return Pilot(
@@ -88,7 +76,7 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
         unwind=2.0 * length / speed,
         heading_band=float(HEADING_ERROR * BAND_SHARE),
         depth_band=float(DEPTH_ERROR * length * BAND_SHARE),
-        reversal=_reversal(model, speed),
+        reversal=reversal_below(model, speed),
         eigenvalues={name: tuple(complex(s) for s in closed_loop(*loop)) for name, loop in loops.items()},
         margins={
             "heading": margins(*heading),
@@ -96,19 +84,45 @@ def design_pilot(model: Model, speed: float | None = None) -> Pilot:
             "depth": margins(*depth),
             **({"roll": margins(*roll)} if np.any(roll[2]) else {}),
         },
-        notes=_notes(linear, loops, speed),
+        notes=notes_of(linear, bool(np.any(roll[2])), speed),
     )
 
 
-def _require(loop: Loop, name: str, where: str) -> Loop:
+def speed_of(model: Model, speed: float | None) -> float:
+    """``speed`` [m/s], or the craft's own, if a pilot can be designed for it.
+
+    Raises
+    ------
+    InputError
+        The speed is not positive.
+    TrialError
+        The craft has no fins.
+    """
+    speed = model.craft.speed if speed is None else float(speed)
+    if not speed > 0.0 or not np.isfinite(speed):
+        raise InputError(
+            f"pilot of {model.craft.name}: speed {speed:g} m/s. Fins need forward speed; give a positive one."
+        )
+    if not model.craft.fins:
+        raise TrialError(f"craft {model.craft.name} has no fins, so no pilot can steer it. Run open-loop trials only.")
+    return speed
+
+
+def unstable(name: str, speed: float, growth: float = float("nan")) -> TrialError:
+    """The error of a loop called ``name`` that no gains stabilise at ``speed`` [m/s]; ``growth`` [1/s]."""
+    return TrialError(
+        f"pilot of this craft at {speed:g} m/s: no gains stabilise {name} (largest eigenvalue {growth:+.3g} 1/s). The "
+        "fins are too weak or too slow for this craft, or act the wrong way: look at Nuudr, Muude, the fins' lag and "
+        "the stability indices."
+    )
+
+
+def _stable(loop: Loop, name: str, speed: float) -> Loop:
     """``loop`` if it is stable; an error that teaches if not."""
     growth = float(closed_loop(*loop)[0].real)
     if growth < 0.0 and np.all(np.isfinite(loop[2])):
         return loop
-    raise TrialError(
-        f"pilot of {where}: no gains stabilise {name} (largest eigenvalue {growth:+.3g} 1/s). The fins are too weak or "
-        "too slow for this craft, or act the wrong way: look at Nuudr, Muude, the fins' lag and the stability indices."
-    )
+    raise unstable(name, speed, growth)
 
 
 def _heading(linear: LinearModel, speed: float, length: float, lag: float, range_: float) -> Loop:
@@ -121,7 +135,7 @@ def _heading(linear: LinearModel, speed: float, length: float, lag: float, range
         control=CONTROL_SHARE * range_,
         start=np.array([0.1 * speed, 0.1 * speed / length, HEADING_ERROR, 0.1, 0.1 * HEADING_ERROR * patience]),
     )
-    return _require((full, outputs, output_feedback(full, outputs, weights)), "heading", _at(speed))
+    return _stable((full, outputs, output_feedback(full, outputs, weights)), "heading", speed)
 
 
 def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_: float) -> tuple[Loop, Loop]:
@@ -133,14 +147,14 @@ def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_:
         control=CONTROL_SHARE * range_,
         start=np.array([0.1 * speed, 0.1 * speed / length, PITCH_ERROR, 0.1]),
     )
-    pitch = _require((inner, attitude, output_feedback(inner, attitude, pitch_weights)), "pitch", _at(speed))
+    pitch = _stable((inner, attitude, output_feedback(inner, attitude, pitch_weights)), "pitch", speed)
     whole = with_servo(block(linear, ("w", "q", "theta", "z"), "elevator"), lag)
     sinking = whole.A[3]
     whole = with_integral(whole, np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
     k_q, k_theta = pitch[2]
     k = np.array([0.0, k_q, k_theta, 0.0, 0.0, 0.0])
     # What the depth loop steers is the craft with its pitch loop closed; its control is the pitch asked for.
-    order = _pitch_order(pitch)
+    order = steady_pitch_order(pitch)
     held = Plant(whole.A - whole.B @ k[None, :], whole.B * order, whole.states)
     outputs = np.vstack([[*sinking, 0.0], np.eye(6)[[3, 5]]])
     patience = INTEGRAL_LENGTHS * length / speed
@@ -153,10 +167,10 @@ def _depth(linear: LinearModel, speed: float, length: float, lag: float, range_:
     outer = output_feedback(held, outputs, weights)
     both = np.vstack([np.eye(6)[[1, 2]], outputs])
     depth = (whole, both, np.array([k_q, k_theta, *(order * outer)]))
-    return pitch, _require(depth, "depth", _at(speed))
+    return pitch, _stable(depth, "depth", speed)
 
 
-def _pitch_order(pitch: Loop) -> float:
+def steady_pitch_order(pitch: Loop) -> float:
     """Elevator per pitch asked for [-] that makes the pitch follow it in the steady state.
 
     Source     Steady gain of the closed pitch loop.
@@ -182,17 +196,13 @@ def _roll(linear: LinearModel, speed: float, length: float, lag: float, range_: 
     return full, outputs, gains if stable else np.zeros(2)
 
 
-def _reversal(model: Model, speed: float) -> float:
+def reversal_below(model: Model, speed: float) -> float:
     """Speed [m/s] below which the elevator acts reversed on depth; 0 if there is none below ``speed``.
 
     A pilot for less than the inversion speed is designed for the reversed elevator and has no order to hold back.
     """
     found = elevator_reversal_speed(model, "wide") or 0.0
     return found if found < speed else 0.0
-
-
-def _at(speed: float) -> str:
-    return f"this craft at {speed:g} m/s"
 
 
 def elevator_authority(linear: LinearModel, speed: float) -> float:
@@ -205,13 +215,14 @@ def elevator_authority(linear: LinearModel, speed: float) -> float:
     return float(steady[0] - speed * steady[2])
 
 
-def _notes(linear: LinearModel, loops: Mapping[str, Loop], speed: float) -> tuple[str, ...]:
+def notes_of(linear: LinearModel, rolls: bool, speed: float) -> tuple[str, ...]:
+    """What a pilot cannot do at ``speed`` [m/s], in words; ``rolls`` : it damps roll."""
     out = []
     if elevator_authority(linear, speed) < 0.0:
         out.append(
             f"At {speed:g} m/s the elevator acts reversed on depth: the speed is below the inversion speed, where the "
             "restoring moment outweighs the fins. The pilot is designed for it and must not be used above that speed."
         )
-    if not np.any(loops["roll"][2]):
+    if not rolls:
         out.append("The fins give no useful roll moment: roll is left to the righting moment.")
     return tuple(out)

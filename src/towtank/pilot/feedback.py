@@ -67,7 +67,7 @@ def closed_loop(plant: Plant, outputs: Array, gains: Array) -> Array:
 def margins(plant: Plant, outputs: Array, gains: Array) -> tuple[float, float, float]:
     """Smallest factor above and largest below 1 by which the loop gain may change, and the phase margin [rad].
 
-    The loop is cut at the command. Infinity or zero where no limit is found between 1e-3 and 1e3 rad/s.
+    The loop is cut at the command. Infinity or zero where no limit is found at rest or between 1e-3 and 1e3 rad/s.
 
     Source     fossen2021, ch. 15: gain and phase margin of the open loop L(jw) = k C (jw - A)^-1 B.
     """
@@ -80,9 +80,9 @@ def margins(plant: Plant, outputs: Array, gains: Array) -> tuple[float, float, f
     grid = np.logspace(-3, 3, 241)
     response = np.array([loop(w) for w in grid])
     up, down, phase = np.inf, 0.0, np.inf
-    for i in np.flatnonzero(np.diff(np.sign(response.imag)) != 0):
-        w = brentq(lambda s: loop(s).imag, grid[i], grid[i + 1])
-        real = loop(w).real
+    crossings = np.flatnonzero(np.diff(np.sign(response.imag)) != 0)
+    turned = [loop(brentq(lambda s: loop(s).imag, grid[i], grid[i + 1])).real for i in crossings]
+    for real in (steady_gain(plant.A, plant.B, row[None, :]), *turned):
         if real < 0.0:
             factor = -1.0 / real
             up, down = (min(up, factor), down) if factor > 1.0 else (up, max(down, factor))
@@ -91,3 +91,14 @@ def margins(plant: Plant, outputs: Array, gains: Array) -> tuple[float, float, f
         w = brentq(lambda s: abs(loop(s)) - 1.0, grid[i], grid[i + 1])
         phase = min(phase, abs(float(np.angle(-loop(w)))))
     return float(up), float(down), float(phase)
+
+
+def steady_gain(A: Array, B: Array, K: Array) -> float:
+    """Gain K (-A)^-1 B of one loop at frequency zero; infinity, unsigned, where it integrates.
+
+    A (n, n), B (n, 1), K (1, n). Where it is negative, a larger gain makes the craft diverge without swinging.
+    """
+    size = np.abs(np.linalg.eigvals(A))
+    if size.min() < 1e-9 * size.max():
+        return float("inf")
+    return float(-(K @ np.linalg.solve(A, B))[0, 0])

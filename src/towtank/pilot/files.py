@@ -1,4 +1,4 @@
-"""``pilot.json``: the gains of a pilot, written whole, read back equal."""
+"""``pilot.json``: the gains of a pilot or of a schedule of pilots, written whole, read back equal."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from towtank.artefact import read_json, write_json
-from towtank.errors import ArtefactError
+from towtank.errors import ArtefactError, InputError
 from towtank.pilot.law import GAINS, Pilot
+from towtank.pilot.scheduled import PilotSchedule
 from towtank.pilot.sensors import Reading, Sensors
 from towtank.provenance import provenance
 
-SCHEMA = "towtank/pilot/1"
+SCHEMA, SCHEDULE = "towtank/pilot/1", "towtank/pilot-schedule/1"
 
 UNITS: Mapping[str, str] = {
     "speed": "m/s", "yaw_rate": "s", "heading": "1/s", "heading_integral": "1/s", "turn_limit": "rad/s",
@@ -31,25 +32,40 @@ _LATER = ("sway", "heave", "scheduled")
 _MARGINS = ("largest_gain_factor", "smallest_gain_factor", "phase_margin")
 
 
-def write_pilot(pilot: Pilot, path: str | Path) -> Path:
+def write_pilot(pilot: Pilot, path: str | Path, inputs: Mapping[str, str] | None = None) -> Path:
     """Write ``pilot`` as JSON, schema ``towtank/pilot/1``; SI units, radians. A margin without limit is null.
+
+    inputs : name -> hash of what the gains were made from.
 
     Raises
     ------
     ArtefactError
         The folder cannot be written.
     """
-    document = {
-        "schema": SCHEMA,
+    return write_json(Path(path), {"schema": SCHEMA, **_content(pilot), "provenance": provenance(inputs)})
+
+
+def write_schedule(schedule: PilotSchedule, path: str | Path, inputs: Mapping[str, str] | None = None) -> Path:
+    """Write ``schedule`` as JSON, schema ``towtank/pilot-schedule/1``: its pilots as ``write_pilot`` writes one.
+
+    Raises
+    ------
+    ArtefactError
+        The folder cannot be written.
+    """
+    pilots = [_content(pilot) for pilot in schedule.pilots]
+    return write_json(Path(path), {"schema": SCHEDULE, "pilots": pilots, "provenance": provenance(inputs)})
+
+
+def _content(pilot: Pilot) -> dict[str, Any]:
+    return {
         "craft": pilot.craft,
         "gains": {name: {"value": getattr(pilot, name), "unit": UNITS[name]} for name in GAINS},
         "eigenvalues": {loop: [[s.real, s.imag] for s in values] for loop, values in pilot.eigenvalues.items()},
         "margins": {loop: dict(zip(_MARGINS, values, strict=True)) for loop, values in pilot.margins.items()},
         "sensors": asdict(pilot.sensors),
         "notes": list(pilot.notes),
-        "provenance": provenance(),
     }
-    return write_json(Path(path), document)
 
 
 def read_pilot(path: str | Path) -> Pilot:
@@ -61,7 +77,29 @@ def read_pilot(path: str | Path) -> Pilot:
         Missing, not JSON, another schema, a gain that is missing or not a finite number, a speed that is not positive.
     """
     path = Path(path)
-    document = read_json(path, SCHEMA)
+    return _pilot(read_json(path, SCHEMA), path)
+
+
+def read_schedule(path: str | Path) -> PilotSchedule:
+    """Read what ``write_schedule`` or ``write_pilot`` wrote; one pilot is a table of one.
+
+    Raises
+    ------
+    ArtefactError
+        As ``read_pilot``, or pilots that make no table.
+    """
+    path = Path(path)
+    try:
+        document = read_json(path, SCHEDULE)
+    except ArtefactError:
+        return PilotSchedule((read_pilot(path),))
+    try:
+        return PilotSchedule(tuple(_pilot(entry, path) for entry in document["pilots"]))
+    except (KeyError, TypeError, InputError) as error:
+        raise ArtefactError(f"{path} is not a whole pilot schedule ({error}). Write it again.") from None
+
+
+def _pilot(document: Mapping[str, Any], path: Path) -> Pilot:
     try:
         return Pilot(
             craft=str(document["craft"]),

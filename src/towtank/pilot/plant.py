@@ -19,6 +19,10 @@ class Plant:
     states: tuple[str, ...]
 
 
+Loop = tuple[Plant, Array, Array]
+"""Plant, outputs (m, n), gains (m,)."""
+
+
 def block(linear: LinearModel, states: tuple[str, ...], control: str) -> Plant:
     """The sub-model of ``states`` with one control; what couples to the other states is left out."""
     part = linear.part(states, (control,))
