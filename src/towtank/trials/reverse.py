@@ -16,7 +16,7 @@ from towtank.quantity import Quantity
 from towtank.trials.ready import FIN_USE, Readings, Ready, run_trial
 from towtank.trials.spiral import algebraic, held_steps, residual, steady_curve, step_rates
 from towtank.trials.start import Setting, angle, fin_limit, setting
-from towtank.trials.steady import SteadyTurns, steady_turns
+from towtank.trials.steady import MeasuredTurns, SteadyTurns, steady_turns
 from towtank.trials.trajectory import Trajectory
 
 HELD = (1.0, 0.5, 1.0 / 6.0)
@@ -24,7 +24,7 @@ HELD = (1.0, 0.5, 1.0 / 6.0)
 ORDERED = (0.9, 0.72, 0.54, 0.38, 0.24, 0.12, 0.04)
 """Rates of turn ordered, as shares of the rate at the last of ``HELD``; to one side, then to the other."""
 FIRST, EACH = 10.0, 6.0
-"""Lengths travelled on the first step and on each of the others before the rudder is read."""
+"""Lengths travelled on the first rudder held and the first rate ordered, and on each of the other steps."""
 APART = 0.01
 """Points closer than this share of the range of curvature are one."""
 LEAST = 8
@@ -62,7 +62,7 @@ def reverse_spiral(
     Source     bech1968; ittc75040201, reverse spiral test.
     Departure  The curve is one over the curvature of the path, as the algebraic one: a speed that still changes moves
                neither its folds nor its zeros.
-    Valid      A cubic through the points: folds closer to each other than two neighbouring rates are not seen.
+    Valid      Folds between neighbouring points are those of a cubic; two folds within one gap are not seen.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def reverse_spiral_ready(
     orders = _orders(s, limit, _inner_rate(model, turns, limit), float(hold_depth))
     return Ready(
         name=f"reverse-spiral-{np.degrees(limit):g}deg", kind="reverse spiral", loop="closed", setting=s,
-        legs=held_steps(orders, FIRST * s.convective, EACH * s.convective), interval=s.convective / 8.0,
+        legs=held_steps(orders, _lasting(len(orders), s.convective)), interval=s.convective / 8.0,
         gauges=_GAUGES, read=lambda flights: _indices(flights, len(orders)),
         status=lambda flights: _status(flights, len(orders)), alone=algebraic(turns),
         curves=lambda flights: _curves(flights, len(orders), turns),
@@ -110,6 +110,10 @@ def _orders(s: Setting, limit: float, rate: float, dive: float) -> list[Orders]:
     return [*held, *rates, *(s.orders(rudder=-share * limit, dive=dive) for share in reversed(HELD))]
 
 
+def _lasting(steps: int, convective: float) -> list[float]:
+    return [(FIRST if i in (0, len(HELD)) else EACH) * convective for i in range(steps)]
+
+
 def _measured(flights: Flights, steps: int, i: int) -> SteadyTurns | None:
     """The curve of craft ``i`` from the steps it held; None where it did not go through all, or held too few."""
     legs = [f"step {k}" for k in range(steps)]
@@ -126,7 +130,7 @@ def _measured(flights: Flights, steps: int, i: int) -> SteadyTurns | None:
     order = order[at_limit[order] < LET_GO]
     kept = order[np.diff(curvature[order], prepend=-np.inf) > APART * np.ptp(curvature)]
     columns = (curvature, rate, rudder, drift, ahead / np.cos(drift))
-    return SteadyTurns(*(values[kept] for values in columns)) if len(kept) >= LEAST else None
+    return MeasuredTurns(*(values[kept] for values in columns)) if len(kept) >= LEAST else None
 
 
 def _indices(flights: Flights, steps: int) -> Readings:

@@ -72,7 +72,7 @@ def spiral_ready(
     convective = s.convective * s.speed / max(float(turns.speed[reached].min()), 0.3 * s.speed)
     return Ready(
         name=f"spiral-{np.degrees(limit):g}deg", kind="spiral", loop="open", setting=s,
-        legs=held_steps(_orders(s, sweep, float(hold_depth)), FIRST * convective, EACH * convective),
+        legs=held_steps(_orders(s, sweep, float(hold_depth)), _lasting(len(sweep), convective)),
         interval=s.convective / 8.0, read=lambda flights: _indices(flights, rudders), alone=algebraic(turns),
         curves=lambda flights: _curves(flights, sweep, turns),
     )  # fmt: skip
@@ -82,13 +82,16 @@ def _orders(s: Setting, sweep: Array, dive: float) -> list[Orders]:
     return [s.orders(rudder=float(rudder), dive=dive) for rudder in sweep]
 
 
-def held_steps(orders: Sequence[Orders], first: float, each: float) -> tuple[Leg, ...]:
-    """Two legs for each order, "step N settling" and "step N", its last quarter; ``first``, ``each`` [s] it lasts."""
+def _lasting(steps: int, convective: float) -> list[float]:
+    return [(EACH if i else FIRST) * convective for i in range(steps)]
+
+
+def held_steps(orders: Sequence[Orders], lasting: Sequence[float]) -> tuple[Leg, ...]:
+    """Two legs for each order, "step N settling" and "step N", its last quarter; ``lasting`` [s] each."""
     legs = []
-    for i, order in enumerate(orders):
-        lasting = each if i else first
+    for i, (order, seconds) in enumerate(zip(orders, lasting, strict=True)):
         legs += [
-            Leg(f"step {i} settling", order, (1.0 - WATCHED) * lasting), Leg(f"step {i}", order, WATCHED * lasting),
+            Leg(f"step {i} settling", order, (1.0 - WATCHED) * seconds), Leg(f"step {i}", order, WATCHED * seconds),
         ]  # fmt: skip
     return tuple(legs)
 

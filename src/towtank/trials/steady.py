@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import Akima1DInterpolator, CubicSpline, PPoly
 from scipy.optimize import root
 
 from towtank.errors import TrialError
@@ -47,8 +47,19 @@ class SteadyTurns:
         roots = self._over(self.rudder).roots(extrapolate=False)
         return float(np.ptp(self._over(self.rate)(roots))) if len(roots) > 1 else 0.0
 
-    def _over(self, values: Array) -> CubicSpline:
+    def _over(self, values: Array) -> PPoly:
         return CubicSpline(self.curvature, values)
+
+
+@dataclass(frozen=True)
+class MeasuredTurns(SteadyTurns):
+    """Turns that were flown, fewer than those of a solution and far from each other at the ends.
+
+    Source     Akima's cubic in its modified form (scipy), which does not swing beyond a steep step between two points.
+    """
+
+    def _over(self, values: Array) -> PPoly:
+        return Akima1DInterpolator(self.curvature, values, method="makima")
 
 
 def steady_turns(model: Model, speed: float, largest: float = 0.6, points: int = 25) -> SteadyTurns:
