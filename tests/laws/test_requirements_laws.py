@@ -262,6 +262,27 @@ def test_a_kind_of_trial_flown_twice_is_the_one_of_the_drawn_craft_or_has_to_be_
         put(DIAMETER, unflown)
 
 
+def test_a_trial_of_the_same_name_at_another_speed_is_another_one(model: Model, evidence: Evidence):
+    faster = run_trial(model, circle_ready(model, "15 deg", "1.5 m/s", pilot=PILOT))
+    assert faster.name == "turning-15deg"
+    r = put(
+        replace(DIAMETER, index="time_to_90", limit="9 s"), Evidence(model, evidence.population, [faster], two(model))
+    )
+    assert r.value == faster.indices["time_to_90"][0]
+    assert math.isnan(r.probability)
+    assert r.drivers == ()
+
+
+def test_without_a_compiled_engine_trials_get_no_driver(
+    model: Model, population: Population, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("towtank.verdict.evidence.library", lambda form: None)
+    r = put(DIAMETER, Evidence(model, population, ready=two(model)))
+    assert r.drivers == ()
+    assert r.probability == pytest.approx(put(DIAMETER, Evidence(model, population)).probability)
+    assert put(Need("index", "at_least", 0.0, criterion="G_h"), Evidence(model, population)).drivers
+
+
 def test_a_standard_trial_that_the_craft_has_not_made_is_not_met(evidence: Evidence):
     step = Need("step", "at_most", "3 deg", trial="heading step", index="overshoot", share=0.9)
     r = put(step, evidence)

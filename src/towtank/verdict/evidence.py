@@ -10,6 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
+from towtank.engine.form import form_of
+from towtank.engine.library import library
 from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.model.equations import Model
@@ -22,6 +24,8 @@ from towtank.verdict.measures import MEASURES
 from towtank.verdict.needs import Need
 from towtank.verdict.steps import Steps, stepped
 
+SAME = 1e-3
+"""Relative difference within which an index is that of the same trial."""
 TRIED = 4
 """Coefficients whose effect on a probability is worked out: those that move the growth rate most."""
 
@@ -102,15 +106,21 @@ class Evidence:
             raise InputError(
                 f"{need.where}.index: {name} has no index {need.index!r}. {_near(need.index, {**own, **drawn})}"
             )
-        values = size(drawn[need.index][0]) if need.index in drawn else None
         best, unit = own.get(need.index) or (float(drawn[need.index][0][0]), drawn[need.index][1])
-        moved = self.flown(name).get(need.index)
-        effect = None if moved is None else self.steps.effect(size(moved[0]))
+        # A trial of the same name at another speed is another one.
+        values, moved = (
+            size(found[need.index][0]) if need.index in found and _same(found[need.index][0][0], best) else None
+            for found in (drawn, self.flown(name))
+        )
+        effect = None if moved is None else self.steps.effect(moved)
         return Numbers(unit, float(size(np.array(best))), values, effect, self.steps.share())
 
     def flown(self, name: str) -> Readings:
-        """Indices of the craft with one coefficient moved, in the trial ``name``; empty where it is not at hand."""
-        if name not in self.ready:
+        """Indices of the craft with one coefficient moved, in the trial ``name``.
+
+        Empty where the trial is not at hand, or there is no compiled engine, on which it costs little.
+        """
+        if library(form_of(self.model)) is None or name not in self.ready:
             return {}
         if name not in self._flown:
             model, trial = self.ready[name]
@@ -164,6 +174,11 @@ class Evidence:
         known = {name: craft.columns.get(name, np.full(len(craft), best[name][0])) for name in self.steps.moves[i]}
         shifted = {name: known[name] + way * step for name, step in self.steps.moves[i].items()}
         return Many(self.model, {**craft.columns, **shifted})
+
+
+def _same(one: float, other: float) -> bool:
+    """True for an index of one trial, flown alone and among others."""
+    return bool(np.isclose(one, other, rtol=SAME, atol=1e-6, equal_nan=True))
 
 
 def _plain(name: str) -> str:
