@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ import typer
 
 from towtank.cli.chain import Chain, open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
-from towtank.cli.pilots import PilotWord, afloat, designs_of, in_words, margins_of, pilot_of, speeds_of
+from towtank.cli.pilots import Noisy, PilotWord, afloat, designs_of, in_words, margins_of, pilot_of, seeing, speeds_of
 from towtank.cli.reply import Reply, answering
 from towtank.cli.study import file_hash
 from towtank.errors import InputError
@@ -39,6 +40,7 @@ def pilot(
     craft: StudyArgument = None,
     pilot: PilotWord = None,
     speeds: Speeds = None,
+    noisy: Noisy = False,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -54,7 +56,8 @@ def pilot(
         chain = open_chain(reply, craft, out).keep_speed()
         asked = speeds_of(speeds) or (chain.craft.speed,)
         model = afloat(chain.model(), asked, reply)
-        table = _table(pilot or "cascade", model, asked)
+        designed = _table(pilot or "cascade", model, asked)
+        table = replace(designed, pilots=tuple(seeing(one, noisy) for one in designed.pilots))
         _publish(chain, model, table)
         _tell(reply, model, table, asked)
 

@@ -27,6 +27,15 @@ PilotWord = Annotated[
     ),
 ]  # fmt: skip
 
+Noisy = Annotated[bool, typer.Option("--noisy", help="The pilot sees through typical sensors, their values assumed.")]
+
+
+def seeing(pilot: Pilot, noisy: bool) -> Pilot:
+    """``pilot``, with typical sensors when ``noisy``."""
+    from towtank.pilot.sensors import TYPICAL
+
+    return replace(pilot, sensors=TYPICAL) if noisy else pilot
+
 
 def pilot_of(word: str, model: Model, speed: float) -> Pilot:
     """The pilot called ``word`` for ``model`` at ``speed`` [m/s].

@@ -8,7 +8,7 @@ import typer
 
 from towtank.cli.chain import Chain, open_chain
 from towtank.cli.options import Debug, Json, Out, StudyArgument
-from towtank.cli.pilots import PilotWord, afloat, in_words, pilot_of, speeds_of
+from towtank.cli.pilots import Noisy, PilotWord, afloat, in_words, pilot_of, seeing, speeds_of
 from towtank.cli.reply import Reply, answering
 from towtank.cli.study import file_hash
 from towtank.parallel import cores
@@ -36,7 +36,8 @@ def tune(
     steps: Steps = "heading-step,depth-step,both",
     drawn: Drawn = 3,
     seed: Seed = 20,
-    rounds: Rounds = 20,
+    rounds: Rounds = 30,
+    noisy: Noisy = False,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -55,7 +56,7 @@ def tune(
         chain = open_chain(reply, craft, out).keep_speed()
         asked = speeds_of(speeds) or (chain.craft.speed, FASTER * chain.craft.speed)
         model = afloat(chain.model(), asked, reply)
-        start = pilot_of(pilot or "cascade", model, asked[0])
+        start = seeing(pilot_of(pilot or "cascade", model, asked[0]), noisy)
         words = tuple(word.strip() for word in steps.split(",") if word.strip())
         found = tune(
             model, start, speeds=asked, steps=words, drawn=drawn, seed=seed, rounds=rounds, threads=cores(),
@@ -84,6 +85,7 @@ def _tell(reply: Reply, found: Tuned) -> None:
     parts = {
         "errors": (old.price.tracking, new.price.tracking), "fin angles": (old.price.fins, new.price.fins),
         "fin speeds": (old.price.rates, new.price.rates), "lack of margin": (old.fence, new.fence),
+        "sensor noise": (old.noise, new.noise),
     }  # fmt: skip
     for word, (before, after) in parts.items():
         reply.say(f"  {word:<16} {before:10.4g} -> {after:.4g}")

@@ -176,10 +176,17 @@ def _case(name: str, speed: float, craft: int, model: Model, pilot: Pilot) -> Ca
     deep = step.depth * length
     leg = Leg(name, s.orders(steer=1.0, dive=1.0, heading=step.heading, depth=deep), ticks * clock.tick)
     fins = model.craft.fins
-    third = CONTROL_SHARE * min(float(fin.max_angle) for fin in fins)
+    angle, rate = fin_size(model, speed)
     return Case(
         name, speed, craft, model, s, record_of([leg], clock), leg,
         wanted=np.array([step.heading, deep, 0.0, *s.state[12:]]),
-        scale=np.array([HEADING_ERROR, DEPTH_ERROR * length, ROLL_ERROR, *[third * np.sqrt(len(fins))] * len(fins)]),
-        rate=third * np.sqrt(len(fins)) / (QUICK * s.convective),
+        scale=np.array([HEADING_ERROR, DEPTH_ERROR * length, ROLL_ERROR, *[angle] * len(fins)]),
+        rate=rate,
     )  # fmt: skip
+
+
+def fin_size(model: Model, speed: float) -> tuple[float, float]:
+    """Angle [rad] and speed [rad/s] of one fin that count one when all fins have them, at ``speed`` [m/s]."""
+    fins = model.craft.fins
+    angle = CONTROL_SHARE * min(float(fin.max_angle) for fin in fins) * float(np.sqrt(len(fins)))
+    return angle, angle * speed / (QUICK * model.craft.length)

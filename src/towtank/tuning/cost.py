@@ -1,4 +1,4 @@
-"""What a pilot costs: errors, fin angles, fin rates and lack of margin, with exact slopes to its gains."""
+"""What a pilot costs: errors, fin angles and speeds, noise and lack of margin, with exact slopes to its gains."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from towtank.frames import Array
 from towtank.pilot.law import Pilot
 from towtank.tuning.cases import SEEN, Case
 from towtank.tuning.fence import Fence
+from towtank.tuning.noise import Noise
 
 FREE = (
     "yaw_rate", "sway", "heading", "heading_integral", "pitch_rate", "pitch", "heave", "depth", "depth_rate",
@@ -74,6 +75,8 @@ class Tie:
 class Objective:
     """Cost over the logarithms of the gains: x (n,) with gain = start gain * exp(x), signs kept.
 
+    Beside the flights: lack of margin (``fence``) and fin speeds from the sensors' noise (``noise``).
+
     Gains that are zero at the start stay zero. ``names`` are those that move. Slopes are those of the flown loop
     (tangents of the engine) and, of the fence, of the linear loops.   rest : cost of a tenfold change of a gain.
 
@@ -83,6 +86,7 @@ class Objective:
     start: Pilot
     cases: Sequence[Case]
     fence: Fence
+    noise: Noise
     tie: Tie
     rest: float = 0.0
     threads: int = 1
@@ -91,6 +95,10 @@ class Objective:
         """Which gains move, and nothing known yet."""
         self.names = tuple(name for name in FREE if getattr(self.start, name) != 0.0)
         self.flights = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop what is known, after a weight was changed."""
         self._known: dict[bytes, tuple[float, Array, Array]] = {}
 
     def pilot(self, x: Array) -> Pilot:
@@ -112,7 +120,8 @@ class Objective:
         if x.tobytes() in self._known:
             return self._known[x.tobytes()][0]
         pilot = self.pilot(x)
-        return float(np.mean([p.total for p in self.prices(pilot)])) + self.fence.cost(pilot) + self.stay(x)
+        flown = float(np.mean([p.total for p in self.prices(pilot)]))
+        return flown + self.fence.cost(pilot) + self.noise.cost(pilot) + self.stay(x)
 
     def stay(self, x: Array) -> float:
         """Cost of having moved to ``x`` (n,)."""
@@ -134,10 +143,12 @@ class Objective:
             with ThreadPoolExecutor(self.threads) as pool:
                 parts = list(pool.map(lambda case: self._one(case, pilot), self.cases))
             value, slope, bend = (sum(part[i] for part in parts) / len(parts) for i in range(3))
-            fence = self.fence.slopes(pilot, self._moving(pilot))
             pull = 2.0 * self.rest / np.log(10.0) ** 2
             value, slope, bend = value + self.stay(x), slope + pull * x, bend + pull * np.eye(len(x))
-            self._known = {key: (float(value + fence[0]), slope + fence[1], bend + fence[2])}
+            for more in (self.fence, self.noise):
+                extra = more.slopes(pilot, self._moving(pilot))
+                value, slope, bend = value + extra[0], slope + extra[1], bend + extra[2]
+            self._known = {key: (float(value), slope, bend)}
         return self._known[key]
 
     def _moving(self, pilot: Pilot) -> Mapping[str, Array]:

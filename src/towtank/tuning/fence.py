@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,25 +69,17 @@ class Fence:
         """What alpha |S - 1/2| - 1 is above 0; one number for each speed, frequency and command."""
         return np.asarray(np.maximum(np.concatenate([self._excess(p, pilot).ravel() for p in self.planes]), 0.0))
 
+    def kept(self, pilot: Pilot) -> bool:
+        """True where the margin itself, without ``AIM``, is kept."""
+        return bool(self.lack(pilot).max() <= AIM - 1.0)
+
     def cost(self, pilot: Pilot) -> float:
         """Cost of ``pilot``."""
         return float(self.weight * (self.lack(pilot) ** 2).sum())
 
     def slopes(self, pilot: Pilot, moving: Mapping[str, Array]) -> tuple[float, Array, Array]:
-        """Cost, its gradient (n,) and second derivative (n, n) in x; ``moving`` : gain -> its slope (n,) to x.
-
-        Central differences of the linear loops along each x: no flight, 1e-6 of each gain.
-        """
-        n, step, r = len(next(iter(moving.values()))), 1e-6, self.lack(pilot)
-        J = np.zeros((len(r), n))
-        for i in range(n):
-            ends = [
-                self.lack(replace(pilot, **{k: getattr(pilot, k) + sign * step * v[i] for k, v in moving.items()}))
-                for sign in (1.0, -1.0)
-            ]
-            J[:, i] = (ends[0] - ends[1]) / (2.0 * step)
-        w = self.weight
-        return float(w * (r**2).sum()), 2.0 * w * J.T @ r, 2.0 * w * J.T @ J
+        """Cost, gradient (n,) and second derivative (n, n) as of ``quadratic``."""
+        return quadratic(lambda one: np.sqrt(self.weight) * self.lack(one), pilot, moving)
 
     @staticmethod
     def _excess(p: Plane, pilot: Pilot) -> Array:
@@ -97,3 +89,21 @@ class Fence:
         S = np.linalg.inv(np.eye(len(COMMANDS)) + law @ p.response)
         own = np.diagonal(S, axis1=1, axis2=2)
         return np.asarray(AIM * ALPHA * np.abs(own - 0.5) - 1.0)
+
+
+def quadratic(
+    residual: Callable[[Pilot], Array], pilot: Pilot, moving: Mapping[str, Array]
+) -> tuple[float, Array, Array]:
+    """Sum of squares of ``residual`` of the pilot, its gradient (n,) and 2 J^T J (n, n) in x.
+
+    moving : gain -> its slope (n,) to x.   Central differences of the linear loops, 1e-6 of each gain: no flight.
+    """
+    n, step, r = len(next(iter(moving.values()))), 1e-6, residual(pilot)
+    J = np.zeros((len(r), n))
+    for i in range(n):
+        ends = [
+            residual(replace(pilot, **{k: getattr(pilot, k) + sign * step * v[i] for k, v in moving.items()}))
+            for sign in (1.0, -1.0)
+        ]
+        J[:, i] = (ends[0] - ends[1]) / (2.0 * step)
+    return float((r**2).sum()), 2.0 * J.T @ r, 2.0 * J.T @ J

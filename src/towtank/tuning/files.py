@@ -46,7 +46,7 @@ def summary(tuned: Tuned) -> dict[str, Any]:
         "drawn": tuned.drawn,
         "seed": tuned.seed,
         "cost": {
-            "terms": "mean squares over size: errors of heading, depth, roll; fin angles; fin speeds; fence",
+            "terms": "mean squares over size: errors of heading, depth, roll; fin angles; fin speeds; fence; noise",
             "askew": float(ASKEW), "quick": QUICK, "fence_weight": tuned.weight,
             "fence": {"gain_factor": GAIN, "disk_margin": ALPHA, "phase": 2.0 * float(np.arctan(ALPHA / 2.0))},
         },
@@ -61,7 +61,8 @@ def summary(tuned: Tuned) -> dict[str, Any]:
 
 def _score(score: Score) -> dict[str, Any]:
     return {
-        "cost": score.cost, **asdict(score.price), "fence": score.fence, "margins_kept": score.kept,
+        "cost": score.cost, **asdict(score.price), "fence": score.fence, "noise": score.noise,
+        "margins_kept": score.kept,
         "flights": [asdict(one) for one in score.flights],
         "margins": [None if m is None else _margins(m) for m in score.margins],
     }  # fmt: skip

@@ -23,13 +23,17 @@ from towtank.tuning.cases import USUAL, Case, cases
 from towtank.tuning.cost import LOST, REST, Objective, Price, Tie, price
 from towtank.tuning.fence import ALPHA, Fence, plane
 from towtank.tuning.margins import RobustMargins, robust_margins
+from towtank.tuning.noise import Noise, jitter
 
-ROUNDS = 20
+ROUNDS = 30
 """Most steps of the search."""
 LITTLE = 1e-3
-"""The search ends when two steps in a row gain less than this share of the cost."""
+"""The search ends when ``PATIENCE`` steps in a row, some of them refused, gain less than this share of the cost."""
+PATIENCE = 4
 FASTER = 1.5
 """The second speed, in those of the pilot, where none are given."""
+RAISED = 2
+"""Times the fence is made ten times steeper when a search ended outside it."""
 TASK = "tune"
 
 
@@ -54,19 +58,21 @@ class Flown:
 class Score:
     """A pilot on all flights.
 
-    price : mean of all craft.   fence : cost of lacking margin.   flights : of the best estimate.
+    price : mean of all craft.   fence : cost of lacking margin.   noise : of fin speeds from the pilot's sensors.
+    flights : of the best estimate.
     margins : at each speed; a speed at which the loop is not stable has none.
     """
 
     price: Price
     fence: float
+    noise: float
     flights: tuple[Flown, ...]
     margins: tuple[RobustMargins | None, ...]
 
     @property
     def cost(self) -> float:
         """What is minimised."""
-        return self.price.total + self.fence
+        return self.price.total + self.fence + self.noise
 
     @property
     def kept(self) -> bool:
@@ -105,10 +111,11 @@ def tune(
     """Gains of least cost on ``model``, from those of ``pilot``, the cascade designed for it when not given.
 
     cost = mean over flights of [mean square of heading, depth and roll errors, of fin angles off level flight and of
-    fin speeds, each over its acceptable size] + fence. Sizes: 20 deg, half a length, 5 deg, a third of the fins' range,
-    that third in a quarter of a length travelled. Rudder and elevator begin a degree off, which the integrals take out.
+    fin speeds, each over its acceptable size] + fence + noise. Sizes: 20 deg, half a length, 5 deg, a third of the
+    fins' range, that third in a quarter of a length. Rudder and elevator begin a degree off, for the integrals.
     The fence is zero where each loop holds a factor 2 of gain either way and 37 deg of phase at every speed
-    (``towtank.tuning.fence``). The result is never dearer than the start.
+    (``towtank.tuning.fence``). Sensors of the pilot that are not exact add the fin speeds their noise causes
+    (``towtank.tuning.noise``); the flights themselves are seen exactly. The result is never dearer than the start.
 
     Parameters
     ----------
@@ -137,7 +144,8 @@ def tune(
         raise InputError(f"tuning: {rounds} rounds. Give zero, which only scores the start, or more.")
     flown = cases(model, first, asked, tuple(steps), drawn, seed)
     fence = Fence([plane(model, u) for u in asked], 0.0)
-    objective = Objective(first, flown, fence, _tie(model, first), threads=threads)
+    noise = Noise([jitter(model, first.sensors, u) for u in asked])
+    objective = Objective(first, flown, fence, noise, _tie(model, first), threads=threads)
     begin = objective.prices(first)
     lost = [case for case, one in zip(flown, begin, strict=True) if one.tracking >= LOST]
     if lost:
@@ -145,10 +153,17 @@ def tune(
             f"tuning of {first.craft}: {len(lost)} of {len(flown)} flights of the start run away, the first a "
             f"{lost[0].name} at {lost[0].speed:g} m/s. A search needs a start that flies: design one for these speeds."
         )
-    size = float(np.mean([one.total for one in begin]))
-    objective.fence, objective.rest = replace(fence, weight=10.0 * size), REST * size
+    size = float(np.mean([one.total for one in begin])) + noise.cost(first)
+    objective.rest, weight = REST * size, 10.0 * size
+    x, count = np.zeros(len(objective.names)), 0
     told.start(TASK, rounds)
-    x, count = _search(objective, rounds, told)
+    for _ in range(RAISED + 1):
+        objective.fence = replace(fence, weight=weight)
+        x, taken = _search(objective, x, rounds - count, told)
+        count += taken
+        if count >= rounds or objective.fence.kept(objective.pilot(x)):
+            break
+        weight *= 10.0
     told.done(TASK)
     best = objective.pilot(x)
     before, after = (_score(model, objective, one, asked) for one in (first, best))
@@ -171,9 +186,9 @@ def _tie(model: Model, pilot: Pilot) -> Tie:
     return Tie(with_heave - without)
 
 
-def _search(objective: Objective, rounds: int, told: Progress) -> tuple[Array, int]:
-    """Point of least cost and the number of steps taken."""
-    x = np.zeros(len(objective.names))
+def _search(objective: Objective, x: Array, rounds: int, told: Progress) -> tuple[Array, int]:
+    """Point of least cost from ``x`` (n,) on and the number of steps taken."""
+    objective.forget()
     if rounds == 0:
         return x, 0
     seen: list[float] = [objective.value(x)]
@@ -181,7 +196,7 @@ def _search(objective: Objective, rounds: int, told: Progress) -> tuple[Array, i
     def watch(intermediate_result: Any) -> None:
         seen.append(float(intermediate_result.fun))
         told.step(TASK, f"cost {seen[-1]:.4g}")
-        if len(seen) > 2 and seen[-3] - seen[-1] < LITTLE * seen[-1]:
+        if len(seen) > PATIENCE and seen[-1 - PATIENCE] - seen[-1] < LITTLE * seen[-1]:
             raise StopIteration
 
     found = minimize(
@@ -199,7 +214,8 @@ def _score(model: Model, objective: Objective, pilot: Pilot, speeds: Sequence[fl
         if case.craft == 0:
             shown.append(_flown(case, seen, found[-1]))
     mean = Price(*(float(np.mean([getattr(p, name) for p in found])) for name in ("tracking", "fins", "rates")))
-    return Score(mean, objective.fence.cost(pilot), tuple(shown), tuple(_margins(model, pilot, u) for u in speeds))
+    fence, noise = objective.fence.cost(pilot), objective.noise.cost(pilot)
+    return Score(mean, fence, noise, tuple(shown), tuple(_margins(model, pilot, u) for u in speeds))
 
 
 def _margins(model: Model, pilot: Pilot, speed: float) -> RobustMargins | None:
