@@ -35,6 +35,8 @@ TRIP = 0.05
 """Height over hull radius from which the edges fix the separation (judgement; the experiment had 0.2)."""
 CORE = 0.15
 """Core of the trailing vortices over the height of the strakes (judgement: the wake is diffuse)."""
+LEAST = 1e-6
+"""Height over hull radius below which a strake has no section: rounding would decide it."""
 NONE = Section(1.0, np.zeros((3, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 
 
@@ -151,10 +153,13 @@ def _start(strake: Strake) -> float:
 
 
 def _section(craft: Craft, strakes: tuple[Strake, ...], station: float, shifted: bool = False) -> Section:
-    standing = [s for s in strakes if (_start(s) if shifted else s.start) <= station <= s.end]
+    radius = float(craft.profile.radius(np.array(station)))
+    standing = [
+        s for s in strakes
+        if (_start(s) if shifted else s.start) <= station <= s.end and float(s.height_at(station)) > LEAST * radius
+    ]  # fmt: skip
     if not standing:
         return NONE
-    radius = float(craft.profile.radius(np.array(station)))
     tips = np.array([radius + float(s.height_at(station)) for s in standing])
     return finned_circle(radius, np.array([s.azimuth for s in standing]), tips)
 
