@@ -64,7 +64,7 @@ def test_people_get_a_table(first: tuple[Path, dict, str]):
     ("options", "words"),
     [
         ([], "nothing to vary"),
-        (["--vary", "strakes=1,2"], "no strakes yet"),
+        (["--vary", "strakes=1,2"], "Did you mean strake"),
         (["--vary", "fin_size"], "write NAME=VALUES"),
         (["--vary", "fin_angle=30,40"], "bare angle"),
         (["--vary", "cg_x=0", "--vary", "cg_x=1"], "each only once"),

@@ -52,6 +52,7 @@ def values(craft: Craft) -> Callable[..., dict[str, float]]:
 
 @pytest.mark.parametrize("name", KINDS)
 def test_an_axis_at_its_base_leaves_the_craft_as_it_is(craft: Craft, name: str):
+    craft = vary(craft, strake_height=0.03) if name.startswith("strake_") else craft
     base = KINDS[name].base(craft)
     assert vary(craft, **{name: f"{base!r} rad" if KINDS[name].unit == "rad" else base}) == craft
 
@@ -95,10 +96,28 @@ def test_fins_are_placed_in_metres_or_in_lengths(craft: Craft):
     assert max(f.trailing_edge for f in vary(craft, fin_position="0.9 L").fins) == pytest.approx(0.9 * craft.length)
 
 
-def test_other_fins_leave_the_trim_as_it_was(craft: Craft):
-    new = vary(craft, fin_size=1.5, fin_position="0.9 L")
-    was, now = (c.origin_from_nose - centre_of_buoyancy(c.profile, c.fins)[1] - c.mass.cg[0] for c in (craft, new))
+@pytest.mark.parametrize("changes", [{"fin_size": 1.5, "fin_position": "0.9 L"}, {"strake_height": 0.04}])
+def test_other_fins_and_strakes_leave_the_trim_as_it_was(craft: Craft, changes: dict[str, float | str]):
+    new = vary(craft, **changes)
+    was, now = (
+        c.origin_from_nose - centre_of_buoyancy(c.profile, c.fins, c.strakes)[1] - c.mass.cg[0] for c in (craft, new)
+    )
     assert now == pytest.approx(was, abs=1e-12)
+
+
+def test_a_craft_without_strakes_gets_four_between_its_fins(craft: Craft):
+    new = vary(craft, strake_height=0.03, strake_length=0.5, strake_taper=0.5)
+    assert sorted(round(math.degrees(s.azimuth)) for s in new.strakes) == [0, 90, 180, 270]
+    assert {(round(s.length, 9), s.height, s.end_height) for s in new.strakes} == {(0.5, 0.015, 0.03)}
+    assert new.symmetry == "fourfold"
+    assert "strake.height" in new.assumed
+    assert vary(new, strake_height=0.0).strakes == () == vary(craft, strake_height=0.0, strake_length=0.4).strakes
+
+
+def test_strakes_cost_drag_and_give_course_stability(values: Callable[..., dict[str, float]]):
+    bare, straked = values(), values(strake_height=0.04, strake_length="0.15 L")
+    assert straked["G_h"] > bare["G_h"]
+    assert straked["Xuu'"] < bare["Xuu'"]
 
 
 def test_the_inertia_about_the_cg_stays_when_the_cg_or_ballast_moves(craft: Craft):
@@ -115,7 +134,12 @@ def test_the_inertia_about_the_cg_stays_when_the_cg_or_ballast_moves(craft: Craf
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"strakes": 1.0}, "a craft file knows no strakes yet"),
+        ({"strakes": 1.0}, "Did you mean strake"),
+        ({"strake_height": 1.0}, "half the diameter"),
+        ({"strake_length": 1.0}, "has no strakes to vary"),
+        ({"strake_height": 0.02, "strake_end": "1.01 L"}, "cannot stand"),
+        ({"strake_height": 0.02, "strake_length": -1.0}, "leaves no strake"),
+        ({"strake_height": 0.02, "strake_taper": 0.0}, "outside 0.02 to 5"),
         ({"fin_sise": 1.0}, "Did you mean fin_size"),
         ({"fin_size": 9.0}, "outside 0.1 to 5"),
         ({"fin_size": 0.0}, "outside 0.1 to 5"),

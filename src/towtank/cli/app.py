@@ -10,6 +10,7 @@ from towtank.cli.assess import assess
 from towtank.cli.check import check
 from towtank.cli.check_coefficients import check_coefficients
 from towtank.cli.derive import derive
+from towtank.cli.design import design
 from towtank.cli.doctor import doctor
 from towtank.cli.faults import faults
 from towtank.cli.grid import grid
@@ -73,6 +74,7 @@ for _command in (
     faults,
     assess,
     sweep,
+    design,
     report,
     doctor,
 ):

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from towtank.tank.tank import Tank
     from towtank.trials.trajectory import Trajectory
 
+BESIDE = ("grid", "design", "cruise")
+"""Files that the report shows and that no stage of the chain writes."""
 STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "faults", "verdict", "report")
 
 
@@ -125,7 +127,8 @@ class Chain:
                 flown_by = {"derivatives": file_hash(study.derivatives), "trials": digest(flown, 16)}
                 return craft | flown_by | judging.inputs(self)
         known = ("plan", "tow", "derive", "trials", "mc", "faults", "verdict")
-        return craft | {name: files.get(name, "") for name in known}
+        beside = {name: file_hash(study.root / f"{name}.json") for name in BESIDE}
+        return craft | {name: files.get(name, "") for name in known} | beside
 
     def done(self, stage: str) -> bool:
         """True when ``stage`` need not be done again."""

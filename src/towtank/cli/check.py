@@ -50,7 +50,10 @@ def _numbers(values: Hydrostatics) -> dict[str, Any]:
 def _text(craft: Craft, h: Hydrostatics) -> str:
     rows = [
         ("length, diameter", f"{h.length:.4g} m, {h.diameter:.4g} m (ratio {h.slenderness:.3g})"),
-        ("volume", f"{h.volume:.5g} m3 (hull {h.hull_volume:.5g}, fins {h.fin_volume:.3g})"),
+        (
+            "volume",
+            f"{h.volume:.5g} m3 (hull {h.hull_volume:.5g}, fins {h.fin_volume:.3g}, strakes {h.strake_volume:.3g})",
+        ),
         ("wetted area", f"{h.wetted_area:.5g} m2 (hull {h.hull_wetted_area:.5g})"),
         ("prismatic coefficient", f"{h.prismatic:.4f}"),
         ("mass", f"{h.mass:.6g} kg"),
@@ -62,6 +65,6 @@ def _text(craft: Craft, h: Hydrostatics) -> str:
         ("pitch at rest", f"{degrees(h.trim):.3g} deg, bow up positive"),
         ("roll stiffness", f"{h.restoring:.4g} N m/rad"),
         ("Reynolds number", f"{h.reynolds:.3g} at {craft.speed:.4g} m/s"),
-        ("fins, symmetry", f"{len(craft.fins)}, {craft.symmetry}"),
+        ("fins, strakes", f"{len(craft.fins)}, {len(craft.strakes)}; symmetry {craft.symmetry}"),
     ]
     return "\n".join([craft.title or craft.name, *(f"  {name:<22} {value}" for name, value in rows)])

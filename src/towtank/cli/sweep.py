@@ -30,7 +30,8 @@ Vary = Annotated[
     typer.Option(
         metavar="NAME=VALUES",
         help='An axis: a list "cg_x=-0.05,0,0.05" or first:last:number "fin_size=0.8:1.4:4". Give it once per axis. '
-        "Names: fin_size, fin_area, fin_span, fin_chord, fin_angle, fin_position, cg_x, cg_z, mass, ballast, speed.",
+        "Names: fin_size, fin_area, fin_span, fin_chord, fin_angle, fin_position, strake_height, strake_length, "
+        "strake_end, strake_taper, cg_x, cg_z, mass, ballast, speed.",
         show_default=False,
     ),
 ]

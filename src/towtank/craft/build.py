@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from towtank.craft.craft import Craft, Fin, Mass, Profile, Propeller
+from towtank.craft.craft import Craft, Fin, Mass, Profile, Propeller, Strake
 from towtank.craft.fins import fin_faults, read_fins
 from towtank.craft.hull import Ellipsoid, Myring, Offsets, Suboff
 from towtank.craft.integrals import centre_of_buoyancy
@@ -15,6 +15,7 @@ from towtank.craft.mass import as_rows, displaced_by_force, displaced_by_percent
 from towtank.craft.origins import Origins
 from towtank.craft.reading import Sections, given_values, one_of, read_sections, value
 from towtank.craft.schema import REQUIRED, OffsetsSection
+from towtank.craft.strakes import read_strakes, strake_faults
 from towtank.errors import CraftError, InputError
 from towtank.frames import Array
 from towtank.quantity import si
@@ -39,13 +40,19 @@ def build(raw: Mapping[str, Any], where: str) -> Craft:
     sections = read_sections(raw)
     faults = sections.faults
     profile = _profile(sections, faults)
-    fins = read_fins(sections)
+    fins, strakes = read_fins(sections), read_strakes(sections)
     craft = None
     if profile:
         wrong = [(fin, [f"{path}.{text}" for text in fin_faults(fin, profile)]) for path, fin in fins]
         faults.extend(text for _, texts in wrong for text in texts)
+        standing = tuple(fin for fin, texts in wrong if not texts)
+        plates = [item for _, item in strakes]
+        faulty = [
+            (s, [f"{path}.{text}" for text in strake_faults(s, profile, standing, plates)]) for path, s in strakes
+        ]
+        faults.extend(text for _, texts in faulty for text in texts)
         if all(name in sections.tables for name in REQUIRED):
-            craft = _assemble(sections, profile, tuple(fin for fin, texts in wrong if not texts))
+            craft = _assemble(sections, profile, standing, tuple(s for s, texts in faulty if not texts))
     if faults or craft is None:
         told = list(dict.fromkeys(faults))
         count = "one fault" if len(told) == 1 else f"{len(told)} faults"
@@ -100,11 +107,11 @@ def _offsets(hull: OffsetsSection, faults: list[str]) -> Offsets | None:
     return Offsets(tuple(x.tolist()), tuple(r.tolist()))
 
 
-def _assemble(sections: Sections, profile: Profile, fins: tuple[Fin, ...]) -> Craft | None:
+def _assemble(sections: Sections, profile: Profile, fins: tuple[Fin, ...], strakes: tuple[Strake, ...]) -> Craft | None:
     tables: dict[str, Any] = dict(sections.tables)
     origins = sections.origins
     water = _water(tables["conditions"], origins)
-    cb = centre_of_buoyancy(profile, fins)[1]
+    cb = centre_of_buoyancy(profile, fins, strakes)[1]
     reference = tables.get("reference")
     origin = value(reference, "origin_from_nose", cb) if reference else cb
     mass = _mass(sections, profile, water, origin - cb)
@@ -131,6 +138,7 @@ def _assemble(sections: Sections, profile: Profile, fins: tuple[Fin, ...]) -> Cr
         assumed=tuple(origins.assumed),
         unsourced=tuple(origins.unsourced),
         sources=tuple(origins.sources.items()),
+        strakes=strakes,
     )
 
 

@@ -1,4 +1,4 @@
-"""The craft: hull, fins, mass, propeller. Frozen data in SI.
+"""The craft: hull, fins, strakes, mass, propeller. Frozen data in SI.
 
 Geometry runs from the nose aft; everything else is in body axes.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -37,8 +37,24 @@ ACTUATOR = ("max_angle", "max_rate", "time_constant", "dead_band", "backlash")
 """Fields of a fin that are its actuator's: the water does not feel them."""
 
 
+class Radial:
+    """What stands out from the hull in a plane through its axis, at ``azimuth`` [rad]."""
+
+    azimuth: float
+
+    @property
+    def span_direction(self) -> Array:
+        """Outward unit vector (3,) in body axes."""
+        return np.array([0.0, np.cos(self.azimuth), np.sin(self.azimuth)])
+
+    @property
+    def lift_direction(self) -> Array:
+        """Unit vector (3,) normal to it, span x e_x: the sense of the lift of a positive deflection."""
+        return np.array([0.0, np.sin(self.azimuth), -np.cos(self.azimuth)])
+
+
 @dataclass(frozen=True)
-class Fin:
+class Fin(Radial):
     """One all-moving fin with a trapezoidal planform.
 
     The planform is given at two radii from the hull axis and extended linearly; what lies inside the hull does not
@@ -91,15 +107,39 @@ class Fin:
             self.trailing_edge + np.tan(self.trailing_edge_sweep) * (np.asarray(y, dtype=float) - self.root_radius)
         )
 
-    @property
-    def span_direction(self) -> Array:
-        """Outward unit vector (3,) in body axes."""
-        return np.array([0.0, np.cos(self.azimuth), np.sin(self.azimuth)])
+
+@dataclass(frozen=True)
+class Strake(Radial):
+    """A long thin plate fixed to the hull along its axis, with square ends.
+
+    ``azimuth`` [rad] as for a fin.   start, end : distances aft of the nose [m].   height, end_height : what stands
+    out of the hull at the start and at the end [m], linear between.   thickness [m].
+    """
+
+    name: str
+    azimuth: float
+    start: float
+    end: float
+    height: float
+    end_height: float
+    thickness: float
 
     @property
-    def lift_direction(self) -> Array:
-        """Unit vector (3,) of the lift of a positive deflection: span x e_x."""
-        return np.array([0.0, np.sin(self.azimuth), -np.cos(self.azimuth)])
+    def length(self) -> float:
+        """Length along the axis [m]."""
+        return self.end - self.start
+
+    @property
+    def area(self) -> float:
+        """Area of one face outside the hull [m2]."""
+        return 0.5 * (self.height + self.end_height) * self.length
+
+    def height_at(self, x: Array | float) -> Array:
+        """Height [m] outside the hull at the distances ``x`` [m] aft of the nose, any shape; zero beyond the ends."""
+        x = np.asarray(x, dtype=float)
+        share = (x - self.start) / self.length
+        height = self.height + (self.end_height - self.height) * share
+        return np.where((share >= 0.0) & (share <= 1.0), height, 0.0)
 
 
 @dataclass(frozen=True)
@@ -153,6 +193,7 @@ class Craft:
     assumed: tuple[str, ...] = ()
     unsourced: tuple[str, ...] = ()
     sources: tuple[tuple[str, str], ...] = ()
+    strakes: tuple[Strake, ...] = ()
 
     @property
     def length(self) -> float:
@@ -163,6 +204,13 @@ class Craft:
     def diameter(self) -> float:
         """Largest hull diameter [m]."""
         return float(2.0 * np.max(self.profile.radius(np.linspace(0.0, self.length, 4001))))
+
+    @cached_property
+    def reach(self) -> float:
+        """Largest distance of hull, fins and strakes from the axis [m]."""
+        x = np.linspace(0.0, self.length, 2001)
+        tips = [float(np.max((self.profile.radius(x) + s.height_at(x))[s.height_at(x) > 0.0])) for s in self.strakes]
+        return max([0.5 * self.diameter, *(fin.tip_radius for fin in self.fins), *tips])
 
     @cached_property
     def mixing(self) -> Array:
@@ -190,12 +238,17 @@ class Craft:
 
     @cached_property
     def symmetry(self) -> str:
-        """``fourfold``, ``mirror`` (both planes), ``port-starboard`` or ``none``, from the fin layout alone."""
-        shapes = {
-            (round(np.degrees(fin.azimuth) % 360.0, 6) % 360.0, fin.root_radius, fin.root_chord, fin.tip_radius,
+        """``fourfold``, ``mirror`` (both planes), ``port-starboard`` or ``none``, from fins and strakes alone."""
+
+        def around(item: Radial) -> float:
+            return float(round(np.degrees(item.azimuth) % 360.0, 6) % 360.0)
+
+        shapes: set[tuple[Any, ...]] = {
+            (around(fin), fin.root_radius, fin.root_chord, fin.tip_radius,
              fin.tip_chord, fin.trailing_edge, fin.trailing_edge_sweep, fin.section)
             for fin in self.fins
         }  # fmt: skip
+        shapes |= {(around(s), s.start, s.end, s.height, s.end_height, s.thickness) for s in self.strakes}
 
         def kept(turn: float, flip: float) -> bool:
             return {(round((turn + flip * s[0]) % 360.0, 6) % 360.0, *s[1:]) for s in shapes} == shapes

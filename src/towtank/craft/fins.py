@@ -74,22 +74,28 @@ def _shape(path: str, section: Any, sections: Sections) -> dict[str, Any]:
     return given_values(section, _SHAPE) | ({"section": section.section} if section.section else {})
 
 
-def fin_faults(fin: Fin, profile: Profile) -> list[str]:
-    """What keeps ``fin`` from standing on the hull: ``key: what is wrong, limit, remedy``, or nothing.
+def fin_root(fin: Fin, profile: Profile) -> tuple[float, float, float]:
+    """Where ``fin`` stands on the hull: leading and trailing edge aft of the nose, and radius [m].
 
-    The root is taken where the middle of the fin's chord meets the hull.
+    The root is taken where the middle of the chord meets the hull.
     """
+    y = fin.root_radius
+    for _ in range(20):
+        middle = float(fin.trailing_edge_at(y) - 0.5 * fin.chord(y))
+        y = 0.5 * (y + float(profile.radius(np.array(middle))))
+    trailing = float(fin.trailing_edge_at(y))
+    return trailing - float(fin.chord(y)), trailing, y
+
+
+def fin_faults(fin: Fin, profile: Profile) -> list[str]:
+    """What keeps ``fin`` from standing on the hull: ``key: what is wrong, limit, remedy``, or nothing."""
     if fin.tip_radius <= fin.root_radius:
         return [
             f"tip_radius: {fin.tip_radius:g} m is not beyond root_radius {fin.root_radius:g} m. "
             "Radii are measured from the hull axis; give the larger one for the tip."
         ]
-    length, y = profile.length, fin.root_radius
-    for _ in range(20):
-        middle = float(fin.trailing_edge_at(y) - 0.5 * fin.chord(y))
-        y = 0.5 * (y + float(profile.radius(np.array(middle))))
-    trailing = float(fin.trailing_edge_at(y))
-    leading = trailing - float(fin.chord(y))
+    length = profile.length
+    leading, trailing, y = fin_root(fin, profile)
     if trailing > length + 1e-9:
         return [
             f"trailing_edge: the root trailing edge lies {trailing:.4g} m aft of the nose, behind the tail at "

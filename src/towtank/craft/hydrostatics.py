@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from towtank.craft.craft import Craft
-from towtank.craft.integrals import centre_of_buoyancy, fin_integrals, hull_integrals
+from towtank.craft.integrals import centre_of_buoyancy, fin_integrals, hull_integrals, strake_integrals
 from towtank.water import GRAVITY
 
 SLENDERNESS_RANGE = (6.0, 13.0)
@@ -19,14 +19,17 @@ REYNOLDS_MIN = 1e6
 BALANCE_WARNING, BALANCE_ERROR = 0.5, 5.0
 """Displacement against geometry, percent: above the first it spoils trim, above the second the shape is another one."""
 TRIM_LIMIT = np.radians(5.0)
+SLENDEREST = 0.5
+"""Aspect ratio of a strake and its image up to which slender-body theory gives its lift slope within 1 % and its centre
+within 0.03 lengths (tests/oracles/test_strake_lattice.py)."""
 
 
 @dataclass(frozen=True)
 class Hydrostatics:
-    """Hull and fins at rest. Volumes [m3], areas [m2], lengths [m], masses [kg].
+    """Hull, fins and strakes at rest. Volumes [m3], areas [m2], lengths [m], masses [kg].
 
-    ``wetted_area`` is that of hull and exposed fins; ``cb`` (3,) [m] from the origin; ``displaced_mass`` is volume
-    times density; ``stated_displaced_mass`` what the file says; ``balance_percent`` how far the file is from the
+    ``wetted_area`` is that of hull, exposed fins and strakes; ``cb`` (3,) [m] from the origin; ``displaced_mass`` is
+    volume times density; ``stated_displaced_mass`` what the file says; ``balance_percent`` how far the file is from the
     geometry; ``net_buoyancy_percent`` stated buoyancy over weight, less 100; ``trim`` [rad] the pitch angle at rest,
     bow up positive; ``restoring`` [N m/rad] the roll stiffness m g (zG - zB).
     """
@@ -37,6 +40,7 @@ class Hydrostatics:
     prismatic: float
     hull_volume: float
     fin_volume: float
+    strake_volume: float
     volume: float
     hull_wetted_area: float
     wetted_area: float
@@ -81,7 +85,8 @@ def hydrostatics(craft: Craft) -> Hydrostatics:
     """
     hull = hull_integrals(craft.profile)
     fins = [fin_integrals(fin, craft.profile) for fin in craft.fins]
-    volume, cb_from_nose, cb_y, cb_z = centre_of_buoyancy(craft.profile, craft.fins)
+    strakes = [strake_integrals(strake, craft.profile) for strake in craft.strakes]
+    volume, cb_from_nose, cb_y, cb_z = centre_of_buoyancy(craft.profile, craft.fins, craft.strakes)
     mass, displaced = craft.mass, volume * craft.water.density
     cb = (craft.origin_from_nose - cb_from_nose, cb_y, cb_z)
     ahead, below = mass.cg[0] - cb[0], mass.cg[2] - cb[2]
@@ -91,10 +96,11 @@ def hydrostatics(craft: Craft) -> Hydrostatics:
         slenderness=craft.length / hull.diameter,
         prismatic=hull.volume / (0.25 * np.pi * hull.diameter**2 * craft.length),
         hull_volume=hull.volume,
-        fin_volume=volume - hull.volume,
+        fin_volume=sum(fin.volume for fin in fins),
+        strake_volume=sum(strake.volume for strake in strakes),
         volume=volume,
         hull_wetted_area=hull.wetted_area,
-        wetted_area=hull.wetted_area + sum(fin.wetted_area - fin.footprint for fin in fins),
+        wetted_area=hull.wetted_area + sum(part.wetted_area - part.footprint for part in (*fins, *strakes)),
         cb=cb,
         cb_from_nose=cb_from_nose,
         mass=mass.mass,
@@ -111,7 +117,7 @@ def hydrostatics(craft: Craft) -> Hydrostatics:
 def check(craft: Craft) -> CraftCheck:
     """Hydrostatics of ``craft`` and everything worth knowing before it is towed, gravest first."""
     h = hydrostatics(craft)
-    findings = [*_balance(h), *_stability(h), *_fins_in_wake(craft, h), *_range(h), *_sources(craft)]
+    findings = [*_balance(h), *_stability(h), *_fins_in_wake(craft, h), *_strakes(craft), *_range(h), *_sources(craft)]
     order = ("error", "warning", "note")
     return CraftCheck(h, tuple(sorted(findings, key=lambda finding: order.index(finding.severity))))
 
@@ -130,7 +136,7 @@ def _balance(h: Hydrostatics) -> list[Finding]:
         Finding(
             severity,
             "mass",
-            f"the file states a displaced mass of {h.stated_displaced_mass:.5g} kg; hull and fins displace "
+            f"the file states a displaced mass of {h.stated_displaced_mass:.5g} kg; the shape displaces "
             f"{h.displaced_mass:.5g} kg ({h.volume:.5g} m3), {off:+.2f} % apart. The limit is {limit:g} %: {reason}. "
             "Check mass and buoyancy, the length and diameter of the hull, and the density. Flooded spaces open to "
             "the sea do not displace: state the mass with their water in it.",
@@ -187,6 +193,27 @@ def _fins_in_wake(craft: Craft, h: Hydrostatics) -> list[Finding]:
             "fast tank was set on fins that end at the hull radius.",
         )
     ]
+
+
+def _strakes(craft: Craft) -> list[Finding]:
+    if not craft.strakes:
+        return []
+    short = [s.name for s in craft.strakes if 2.0 * s.area / s.length**2 > SLENDEREST]
+    words = (
+        f"{len(craft.strakes)} strakes, up to {craft.reach:.4g} m from the axis. The fast tank knows their load by "
+        "slender-body theory; OpenFOAM meshes none. Their weight is part of the stated mass."
+    )
+    found = [Finding("note", "strake", words)]
+    if short:
+        found.append(
+            Finding(
+                "warning",
+                "strake",
+                f"{', '.join(short)}: two heights over the length is above {SLENDEREST:g}. Slender-body theory does "
+                "not hold for so short a plate; describe it as a fin, or make it longer or lower.",
+            )
+        )
+    return found
 
 
 def _range(h: Hydrostatics) -> list[Finding]:

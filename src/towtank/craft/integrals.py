@@ -1,4 +1,4 @@
-"""Volumes, centroids, areas and inertias of hull and fins, by quadrature on the analytic shapes."""
+"""Volumes, centroids, areas and inertias of hull, fins and strakes, by quadrature on the analytic shapes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from towtank.craft.craft import Fin, Profile
+from towtank.craft.craft import Fin, Profile, Strake
 from towtank.craft.section import half_thickness
 from towtank.frames import Array
 
@@ -28,7 +28,7 @@ class HullIntegrals:
 
 @dataclass(frozen=True)
 class FinIntegrals:
-    """What one fin adds outside the hull.
+    """What one fin or strake adds outside the hull.
 
     ``centroid`` [m]: (aft of the nose, radius). ``wetted_area`` counts faces and tip, ``footprint`` the hull surface
     it covers, ``exposed_area`` the planform outside the hull [m2].
@@ -131,14 +131,32 @@ def _footprint(fin: Fin, profile: Profile, count: int = 4001) -> float:
     return float(np.sum(0.5 * (arc[1:] + arc[:-1]) * length))
 
 
-def centre_of_buoyancy(profile: Profile, fins: tuple[Fin, ...]) -> tuple[float, float, float, float]:
-    """Volume [m3] and centroid of hull and fins: (volume, x aft of the nose, y, z) [m], y and z in body axes."""
+def strake_integrals(strake: Strake, profile: Profile, count: int = 2001) -> FinIntegrals:
+    """Volume, centroid, wetted area and hull footprint of ``strake``: a plate of constant thickness, ends square.
+
+    The wetted area counts both faces, the outer edge and the two ends.
+    """
+    x = np.linspace(strake.start, strake.end, count)
+    r, h, t = profile.radius(x), strake.height_at(x), strake.thickness
+    area = float(np.trapezoid(h, x))
+    centroid = (float(np.trapezoid(h * x, x)) / area, float(np.trapezoid(h * (r + 0.5 * h), x)) / area)
+    edge = float(np.hypot(np.diff(x), np.diff(r + h)).sum())
+    root = float(np.hypot(np.diff(x), np.diff(r)).sum())
+    wetted = 2.0 * area + t * (edge + strake.height + strake.end_height)
+    return FinIntegrals(t * area, centroid, wetted, t * root, area)
+
+
+def centre_of_buoyancy(
+    profile: Profile, fins: tuple[Fin, ...], strakes: tuple[Strake, ...] = ()
+) -> tuple[float, float, float, float]:
+    """Volume [m3] and centroid of the craft: (volume, x aft of the nose, y, z) [m], y and z in body axes."""
     hull = hull_integrals(profile)
     volume, moment = hull.volume, hull.volume * np.array([hull.centroid, 0.0, 0.0])
-    for fin in fins:
-        part = fin_integrals(fin, profile)
+    parts = [(fin.span_direction, fin_integrals(fin, profile)) for fin in fins]
+    parts += [(strake.span_direction, strake_integrals(strake, profile)) for strake in strakes]
+    for outward, part in parts:
         volume += part.volume
-        place = np.array([part.centroid[0], 0.0, 0.0]) + part.centroid[1] * fin.span_direction
+        place = np.array([part.centroid[0], 0.0, 0.0]) + part.centroid[1] * outward
         moment = moment + part.volume * place
     x, y, z = np.round(moment / volume, 12) + 0.0
     return volume, float(x), float(y), float(z)

@@ -12,6 +12,12 @@ from towtank.craft.origins import Origins, assumed_keys
 from towtank.craft.schema import HULLS, REQUIRED, SECTIONS, Given, Section
 from towtank.errors import CraftError
 
+REPEATED = {
+    "fin": "each single fin as [[fin]], with double brackets; [fins] repeats one shape",
+    "strake": "each set of strakes as [[strake]], with double brackets; azimuths or layout repeats one shape",
+}
+"""Sections that may stand several times, and how they are written."""
+
 
 @dataclass
 class Sections:
@@ -19,6 +25,7 @@ class Sections:
 
     tables: dict[str, Section] = field(default_factory=dict)
     fins: list[tuple[str, Section]] = field(default_factory=list)
+    strakes: list[tuple[str, Section]] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     origins: Origins = field(default_factory=Origins)
 
@@ -51,24 +58,24 @@ def read_sections(raw: Mapping[str, Any]) -> Sections:
         if name not in raw:
             found.faults.append(f"[{name}]: this section is missing. Add it; `towtank new NAME` shows a whole file.")
     for name, content in raw.items():
-        if name == "fin" and isinstance(content, list):
+        if name in REPEATED and isinstance(content, list):
             for number, item in enumerate(content, start=1):
-                path = f"fin[{number}]"
-                section = _section(path, SECTIONS["fin"], item, found.faults)
+                path = f"{name}[{number}]"
+                section = _section(path, SECTIONS[name], item, found.faults)
                 if section:
-                    found.fins.append((path, section))
+                    (found.fins if name == "fin" else found.strakes).append((path, section))
         elif name in known:
             section = _one(name, content, found.faults)
             if section:
                 found.tables[name] = section
-    for path, section in [*found.tables.items(), *found.fins]:
+    for path, section in [*found.tables.items(), *found.fins, *found.strakes]:
         found.origins.add(path, section)
     return found
 
 
 def _one(name: str, content: Any, faults: list[str]) -> Section | None:
-    if name == "fin":
-        faults.append("fin: write each single fin as [[fin]], with double brackets; [fins] repeats one shape.")
+    if name in REPEATED:
+        faults.append(f"{name}: write {REPEATED[name]}.")
         return None
     if name != "hull":
         return _section(name, SECTIONS[name], content, faults)

@@ -232,6 +232,22 @@ class FinSection(FinShape):
     sign: Literal[1, -1] = Field(1, description="turns the vehicle's own fin angle into the right-handed sense")
 
 
+class StrakeSection(Section):
+    """[[strake]]: equal strakes around the hull."""
+
+    name: str = Field("strake", description="name; several strakes get numbers behind it", min_length=1)
+    layout: Literal["x", "plus"] | None = Field(None, description='four strakes: "x" (45 deg off) or "plus"')
+    azimuths: list[Angle] | None = Field(
+        None, description="or span directions: 0 starboard, 90 deg keel, 180 deg port, 270 deg deck"
+    )
+    start: PositiveLength = Field(description="distance of the leading end aft of the nose")
+    end: PositiveLength = Field(description="distance of the trailing end aft of the nose")
+    height: PositiveLength = Field(description="what stands out of the hull, at the start and, if nothing else is "
+                                               "said, at the end")  # fmt: skip
+    end_height: PositiveLength | None = Field(None, description="what stands out of the hull at the end")
+    thickness: PositiveLength = Field(description="thickness of the plate")
+
+
 class PointSection(Section):
     """A point from the origin, body axes."""
 
@@ -292,6 +308,7 @@ SECTIONS: dict[str, type[Section]] = {
     "conditions": ConditionsSection,
     "fins": FinsSection,
     "fin": FinSection,
+    "strake": StrakeSection,
     "mass": MassSection,
     "propeller": PropellerSection,
     "reference": ReferenceSection,

@@ -1,4 +1,4 @@
-"""Watertight solid of hull and fins, and its STL and GLB files."""
+"""Watertight solid of hull, fins and strakes, and its STL and GLB files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from towtank.artefact import replace_file
-from towtank.craft.craft import Craft, Fin, Profile
+from towtank.craft.craft import Craft, Fin, Profile, Strake
 from towtank.craft.integrals import stations
 from towtank.craft.section import cosine_fractions, half_thickness
 from towtank.errors import CraftError
@@ -28,10 +28,10 @@ _GLTF_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 
 
 def solid(craft: Craft, around: int = _AROUND, along: int = _ALONG) -> trimesh.Trimesh:
-    """Closed triangle mesh of hull and fins [m], body axes (x forward, y starboard, z down) from the origin.
+    """Closed triangle mesh of hull, fins and strakes [m], body axes (x forward, y starboard, z down) from the origin.
 
-    Fins are carried into the hull and fused with it, so no facet lies inside the body. ``around`` and ``along`` are
-    the facets around the hull and the stations along it.
+    Fins and strakes are carried into the hull and fused with it, so no facet lies inside the body. ``around`` and
+    ``along`` are the facets around the hull and the stations along it.
 
     Raises
     ------
@@ -43,6 +43,8 @@ def solid(craft: Craft, around: int = _AROUND, along: int = _ALONG) -> trimesh.T
     body = _hull(craft.profile, around, along)
     for fin in craft.fins:
         body = body + _fin(fin, craft.profile)
+    for strake in craft.strakes:
+        body = body + _strake(strake, craft.profile)
     if len(body.decompose()) != 1:
         raise CraftError(
             f"craft {craft.name!r}: hull and fins do not make one body, a fin stands clear of the hull. "
@@ -95,6 +97,19 @@ def _fin(fin: Fin, profile: Profile) -> Any:
         ]
     )
     return raised.transform(place)
+
+
+def _strake(strake: Strake, profile: Profile) -> Any:
+    """Plate from inside the hull to its outer edge, x aft of the nose."""
+    from manifold3d import CrossSection, FillRule, Manifold
+
+    x = np.linspace(strake.start, strake.end, _CHORD_POINTS)
+    r = profile.radius(x)
+    outline = np.concatenate([np.stack([x, 0.5 * r], axis=1), np.stack([x, r + strake.height_at(x)], axis=1)[::-1]])
+    plate = Manifold.extrude(CrossSection([outline.tolist()], FillRule.NonZero), strake.thickness)
+    y, z = strake.span_direction[1:]
+    half = 0.5 * strake.thickness
+    return plate.transform(np.array([[1.0, 0.0, 0.0, 0.0], [0.0, y, -z, z * half], [0.0, z, y, -y * half]]))
 
 
 def _inner_radius(fin: Fin, profile: Profile) -> float:

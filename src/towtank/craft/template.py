@@ -57,6 +57,14 @@ max_rate      = "60 deg/s"
 time_constant = "0.1 s"
 # signs = [1, 1, 1, 1]            # -1 where the vehicle counts a fin angle the other way (docs/craft.md)
 
+# [[strake]]                      # fixed plates along the hull; one table for each shape, layout "x" or "plus",
+# layout     = "plus"             # or azimuths = ["90 deg", "270 deg"]
+# assumed    = true
+# start      = "1.45 m"           # distances aft of the nose
+# end        = "1.75 m"
+# height     = "0.02 m"           # what stands out of the hull; end_height where it differs at the end
+# thickness  = "3 mm"
+
 [mass]
 # Mass with the water enclosed in the hull. One of net_buoyancy_percent (signed, negative is heavy), buoyancy
 # (a force, or "neutral") and volume.

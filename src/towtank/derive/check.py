@@ -167,7 +167,7 @@ def subject(derivatives: Derivatives, craft: Craft | None = None) -> Subject:
 
 
 def body_of(craft: Craft) -> Body:
-    """Sizes of a craft; a fin shows the part of its span that lies across the flow.
+    """Sizes of a craft; a fin or strake shows the part of its span that lies across the flow.
 
     Source     THEORY section 9, item 1: roll inertia of four fins 2/pi rho int s^4 dx, the body neglected.
     """
@@ -181,8 +181,12 @@ def body_of(craft: Craft) -> Body:
         seen = fin_integrals(fin, craft.profile).exposed_area * abs(float(np.sin(fin.azimuth)))
         arm = abs(craft.origin_from_nose - fin.trailing_edge + 0.5 * fin.root_chord)
         area, third = area + seen, third + seen * arm**3
+    for strake in craft.strakes:
+        seen = strake.area * abs(float(np.sin(strake.azimuth)))
+        arm = abs(craft.origin_from_nose - 0.5 * (strake.start + strake.end))
+        area, third = area + seen, third + seen * arm**3
     roll = None
-    if len(craft.fins) == 4:
+    if len(craft.fins) == 4 and not craft.strakes:
         mean = [0.5 * (fin.root_chord + fin.tip_chord) * fin.tip_radius**4 for fin in craft.fins]
         roll = 2.0 / np.pi * craft.water.density * float(np.mean(mean))
     return Body(hydrostatics(craft).displaced_mass, craft.diameter, area, third, roll)

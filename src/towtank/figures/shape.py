@@ -1,4 +1,4 @@
-"""The craft: side and stern view of hull and fins, and a shaded picture of its surface."""
+"""The craft: side and stern view of hull, fins and strakes, and a shaded picture of its surface."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towtank.craft.craft import Craft
-from towtank.figures.paper import BAD, FIT, INK, ORIGIN, frame, head, legend, new_axes
+from towtank.figures.paper import BAD, FIT, INK, OK, ORIGIN, frame, head, legend, new_axes
 from towtank.frames import Array
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ GEOMETRY = "geometry as given, no uncertainty stated"
 
 
 def side_view(craft: Craft, ax: Axes | None = None) -> Axes:
-    """Hull outline and fins, metres aft of the nose, seen from starboard; CB and CG marked."""
+    """Hull outline, fins and strakes, metres aft of the nose, seen from starboard; CB and CG marked."""
     ax = new_axes(ax, width=6.4, height=2.2)
     x = np.linspace(0.0, craft.length, 301)
     r = craft.profile.radius(x)
@@ -31,6 +31,12 @@ def side_view(craft: Craft, ax: Axes | None = None) -> Axes:
         ax.fill(
             np.r_[fore, aft[::-1]], np.r_[height, height[::-1]], color=FIT, alpha=0.35, linewidth=0.8, edgecolor=FIT
         )
+    for strake in craft.strakes:
+        along = np.linspace(strake.start, strake.end, 41)
+        root = craft.profile.radius(along)
+        tip, down = root + strake.height_at(along), strake.span_direction[2]
+        outline = np.r_[root, tip[::-1]] * down
+        ax.fill(np.r_[along, along[::-1]], outline, color=OK, alpha=0.35, linewidth=0.8, edgecolor=OK)
     ax.plot(craft.origin_from_nose, 0.0, "+", color=INK, markersize=7, label="origin")
     cg = craft.mass.cg
     ax.plot(craft.origin_from_nose - cg[0], cg[2], "x", color=BAD, markersize=5, label="CG")
@@ -43,7 +49,7 @@ def side_view(craft: Craft, ax: Axes | None = None) -> Axes:
 
 
 def stern_view(craft: Craft, ax: Axes | None = None) -> Axes:
-    """Fins seen from astern with their numbers, starboard to the right, keel downwards [m]."""
+    """Fins and strakes seen from astern, the fins with their numbers, starboard to the right, keel downwards [m]."""
     ax = new_axes(ax, width=2.6, height=2.6)
     turn = np.linspace(0.0, 2.0 * np.pi, 73)
     ax.fill(
@@ -53,6 +59,11 @@ def stern_view(craft: Craft, ax: Axes | None = None) -> Axes:
         linewidth=0.8,
         edgecolor=INK,
     )
+    for strake in craft.strakes:
+        along = np.linspace(strake.start, strake.end, 41)
+        root = craft.profile.radius(along)
+        ends = np.array([root.min(), (root + strake.height_at(along)).max()])[:, None] * strake.span_direction
+        ax.plot(ends[:, 1], ends[:, 2], color=OK, linewidth=1.2)
     for i, fin in enumerate(craft.fins):
         tip = fin.tip_radius * fin.span_direction
         root = fin.root_radius * fin.span_direction

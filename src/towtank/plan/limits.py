@@ -180,7 +180,7 @@ def _measure(test: CaptiveTest, craft: Craft) -> Violence:
     U, L, period = test.speed, craft.length, test.motion.period
     # 128 intervals: a multiple of four holds the extremes of sines and cosines exactly.
     u, v, w, p, q, r = test.motion.history(np.linspace(0.0, period, 129)).nu.T
-    radius = max([craft.diameter / 2.0, *(fin.tip_radius for fin in craft.fins)])
+    radius = craft.reach
     frequency = 2.0 * math.pi / period * L / U if period else 0.0
 
     def peak(values: Array) -> float:

@@ -16,6 +16,7 @@ from towtank.parallel import each
 from towtank.provenance import VERSION
 from towtank.report import (
     of_craft,
+    of_design,
     of_fit,
     of_grid,
     of_jammed,
@@ -42,6 +43,7 @@ SECTIONS: tuple[Callable[[Study, Sketchbook], Section], ...] = (
     of_montecarlo.uncertainty,
     of_jammed.faults,
     of_verdict.verdict,
+    of_design.design,
     of_verdict.validation,
     of_trust.sensitivity,
     of_trust.limits,
@@ -62,7 +64,7 @@ def report(path: str | Path, *things: Any, title: str = "") -> Path:
     ----------
     path : file to be written.
     things : Craft, Plan, Run, GridStudy, Derivatives, FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins,
-        Verdict, or sequences of them, in any order. A stage that is not given is named in the page.
+        Verdict, DesignStudy, Cruise, or sequences of them, in any order. A stage that is not given is named in the page.
     title : of the page; the craft's own when left out.
 
     Returns

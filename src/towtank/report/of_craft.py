@@ -16,7 +16,7 @@ GEOMETRY = "none stated; numbers are as given in the craft file"
 
 
 def craft(study: Study, book: Sketchbook) -> Section:
-    """Principal particulars, hydrostatics, fins, remarks of the check, drawings and the 3-D view."""
+    """Principal particulars, hydrostatics, fins, strakes, remarks of the check, drawings and the 3-D view."""
     if study.craft is None:
         return Section("craft", "Craft and conditions", (missing("No craft was given.", STAGES["craft"]),))
     it = study.craft
@@ -25,13 +25,14 @@ def craft(study: Study, book: Sketchbook) -> Section:
         blocks.append(view(it))
     except TowtankError as error:
         blocks.append(Text(f"The surface of the craft cannot be shown: {error}", "bad"))
-    blocks.append(book.draw(shape.side_view, it, caption="Hull and fins to scale, seen from starboard."))
+    blocks.append(book.draw(shape.side_view, it, caption="Hull, fins and strakes to scale, seen from starboard."))
     if it.fins:
         words = "Fins seen from astern. Arrows: sense of the force of a positive deflection."
         blocks.append(book.draw(shape.stern_view, it, caption=words))
     found = check(it)
     blocks += [_particulars(it), _hydrostatics(it)]
     blocks += [_fins(it)] if it.fins else [Text("The craft has no fins.")]
+    blocks += [_strakes(it)] if it.strakes else []
     blocks += [_findings(found.findings)] if found.findings else []
     blocks += [_sources(it)] if it.sources or it.assumed else []
     return Section("craft", "Craft and conditions", tuple(blocks))
@@ -70,7 +71,7 @@ def _particulars(it: Craft) -> Table:
         ("Water density", number(water.density, 5), "kg/m3", _mark(it, "conditions.density")),
         ("Kinematic viscosity", number(water.kinematic_viscosity), "m2/s", _mark(it, "conditions.kinematic_viscosity")),
         ("Reynolds number", number(water.reynolds(speed, it.length), 3), "", "follows"),
-        ("Symmetry of the fin layout", it.symmetry, "", "follows"),
+        ("Symmetry of fins and strakes", it.symmetry, "", "follows"),
     )  # fmt: skip
     return Table("Principal particulars and conditions", ("Quantity", "Value", "Unit", "Origin of the number"), rows,
                  stated("", GEOMETRY, more="Numbers marked assumed are choices, not data of the craft"))  # fmt: skip
@@ -81,7 +82,8 @@ def _hydrostatics(it: Craft) -> Table:
     rows = (
         ("Slenderness L/D", number(h.slenderness), ""), ("Prismatic coefficient", number(h.prismatic), ""),
         ("Volume of hull", number(h.hull_volume, 5), "m3"), ("Volume of fins", number(h.fin_volume), "m3"),
-        ("Wetted area, hull and fins", number(h.wetted_area), "m2"),
+        ("Volume of strakes", number(h.strake_volume), "m3"),
+        ("Wetted area, whole craft", number(h.wetted_area), "m2"),
         ("Centre of buoyancy aft of the nose", number(h.cb_from_nose, 5), "m"),
         ("Mass of the enclosed water", number(h.displaced_mass, 6), "kg"),
         ("Stated displacement against it", f"{h.balance_percent:+.2f}", "%"),
@@ -111,6 +113,19 @@ def _fins(it: Craft) -> Table:
     if "assumed" in marked:
         more += ". Some of these numbers are assumed; see the list of sources"
     return Table("Fins", head, rows, stated("", GEOMETRY, more=more))
+
+
+def _strakes(it: Craft) -> Table:
+    rows = tuple(
+        (s.name, *(number(v, 4) for v in (float(np.degrees(s.azimuth)), s.start, s.end, s.height, s.end_height)),
+         number(1e3 * s.thickness))
+        for s in it.strakes
+    )  # fmt: skip
+    head = ("Name", "Azimuth [deg]", "Start aft of nose [m]", "End aft of nose [m]", "Height at start [m]",
+            "Height at end [m]", "Thickness [mm]")  # fmt: skip
+    marked = any(entry.startswith("strake") for entry in it.assumed)
+    more = "Fixed plates; heights are measured from the hull" + (". Some numbers are assumed" if marked else "")
+    return Table("Strakes", head, rows, stated("", GEOMETRY, more=more))
 
 
 def _findings(findings: tuple[Finding, ...]) -> Table:

@@ -23,8 +23,8 @@ LIMITS = (
 )
 TANK_LIMITS = (
     "The fast tank is semi-empirical: potential flow, boundary layer, cross-flow and fin lift with the constants "
-    "listed in this report. It is not CFD and not experiment. It knows no propeller, sail, strake, antenna, lee "
-    "vortex or laminar separation.",
+    "listed in this report. It is not CFD and not experiment. It knows no propeller, sail, antenna, lee vortex "
+    "or laminar separation. The load of strakes is slender-body theory and was compared with two experiments only.",
 )
 HARMONIC = {"sway", "yaw", "heave", "pitch"}
 
@@ -116,7 +116,7 @@ def constants(study: Study, book: Sketchbook) -> Section:
             title,
             (Text("No run comes from the fast tank, so no fitted constant is behind these results."),),
         )
-    from towtank.tank.fast.constants import CONSTANTS
+    from towtank.tank.fast.constants import CONSTANTS, STRAKES
 
     rows = tuple(
         (
@@ -126,7 +126,7 @@ def constants(study: Study, book: Sketchbook) -> Section:
             c.meaning,
             c.fitted_on or "not fitted",
         )
-        for c in CONSTANTS
+        for c in (*CONSTANTS, *(STRAKES if study.craft and study.craft.strakes else ()))
     )
     head = ("Constant", "Value", "std in the ensemble", "Meaning", "Fitted on")
     words = "each constant is drawn from its distribution in the ensemble; that spread is the model-form uncertainty"

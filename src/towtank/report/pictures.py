@@ -131,5 +131,6 @@ def view(craft: Craft) -> View:
     return View(
         base64.b64encode(glb).decode("ascii"),
         base64.b64encode(still.getvalue()).decode("ascii"),
-        f"Hull of revolution fused with {len(craft.fins)} fins. Geometry as given; no uncertainty stated.",
+        f"Hull of revolution fused with {len(craft.fins)} fins and {len(craft.strakes)} strakes. Geometry as given; no "
+        "uncertainty stated.",
     )

@@ -20,6 +20,8 @@ from towtank.trials.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from towtank.derive.study import FrequencyStudy
+    from towtank.design.cruise import Cruise
+    from towtank.design.study import DesignStudy
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
     from towtank.trials.jammed import JammedFins
@@ -35,6 +37,7 @@ STAGES = {
     "mc": "Pass the MonteCarlo, or run `towtank mc`.",
     "faults": "Pass the JammedFins, or run `towtank faults`.",
     "verdict": "Pass the Verdict, or run `towtank assess`.",
+    "design": "Pass the DesignStudy, or run `towtank design`.",
     "grid": "Pass the GridStudy, or run `towtank grid`.",
     "validation": "Run `make validate`, which compares the fast tank with published tests.",
 }
@@ -60,6 +63,8 @@ class Study:
     mc: MonteCarlo | None = None
     jammed: JammedFins | None = None
     verdict: Verdict | None = None
+    design: DesignStudy | None = None
+    cruise: Cruise | None = None
     index: Mapping[str, Any] = field(default_factory=dict)
     grid: GridStudy | None = None
     optimal: Mapping[str, Any] = field(default_factory=dict)
@@ -166,23 +171,23 @@ def _part(thing: Any) -> str:
         if isinstance(thing, kind):
             return name
     from towtank.derive.study import FrequencyStudy
+    from towtank.design.cruise import Cruise
+    from towtank.design.study import DesignStudy
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
     from towtank.trials.jammed import JammedFins
     from towtank.verdict.table import Verdict
 
-    for of, name in (
-        (FrequencyStudy, "frequency"),
-        (Model, "model"),
-        (MonteCarlo, "mc"),
-        (JammedFins, "jammed"),
-        (Verdict, "verdict"),
-    ):
+    late: tuple[tuple[type, str], ...] = (
+        (FrequencyStudy, "frequency"), (Model, "model"), (MonteCarlo, "mc"), (JammedFins, "jammed"),
+        (Verdict, "verdict"), (DesignStudy, "design"), (Cruise, "cruise"),
+    )  # fmt: skip
+    for of, name in late:
         if isinstance(thing, of):
             return name
     raise InputError(
         f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, GridStudy, Derivatives, "
-        "FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins, Verdict, or sequences of them."
+        "FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins, Verdict, DesignStudy, Cruise, or sequences of them."
     )
 
 
@@ -217,6 +222,8 @@ def read_study(folder: Path | str) -> Study:
     from towtank.craft.library import read_craft
     from towtank.derive.files import read_derivatives
     from towtank.derive.study_files import read_frequencies
+    from towtank.design.cruise import read_cruise
+    from towtank.design.files import read_design
     from towtank.experiments.files import own_plan, read_optimal
     from towtank.grid.files import read_grid
     from towtank.montecarlo.files import read_mc
@@ -239,6 +246,8 @@ def read_study(folder: Path | str) -> Study:
         mc=attempt("mc", root / "mc.json", lambda: read_mc(root)),
         jammed=attempt("faults", root / "faults.json", lambda: read_jammed(root / "faults.json")),
         verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
+        design=attempt("design", root / "design.json", lambda: read_design(root / "design.json")),
+        cruise=attempt("design", root / "cruise.json", lambda: read_cruise(root / "cruise.json")),
         index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
         grid=attempt("grid", root / "grid.json", lambda: read_grid(root / "grid.json")),
         optimal=attempt("plan", root / "optimal.json", lambda: read_optimal(root / "optimal.json"), {}),
@@ -246,7 +255,19 @@ def read_study(folder: Path | str) -> Study:
     if study.optimal and not own_plan(root):
         words = "plan.toml is not the plan of optimal.json, which is left out."
         study = replace(study, optimal={}, remarks=(*study.remarks, words))
-    return completed(replace(study, problems=tuple(problems)))
+    return completed(replace(study, problems=tuple(problems), remarks=(*study.remarks, *_of_another_craft(study))))
+
+
+def _of_another_craft(study: Study) -> list[str]:
+    """What is to be said of a design study whose craft is not the one of the report, but of the same name or not."""
+    from towtank.provenance import digest
+
+    if study.design is None or study.craft is None:
+        return []
+    was = study.design.provenance.get("inputs", {}).get("craft")
+    if was == digest(replace(study.craft, speed=study.design.speed), 16):
+        return []
+    return ["design.json was made of another craft, or of this one before its file was changed. Run `towtank design`."]
 
 
 def _runs(root: Path, attempt: Callable[..., Any]) -> tuple[Run, ...]:

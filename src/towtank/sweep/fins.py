@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from towtank.craft.craft import Craft, Fin
-from towtank.craft.fins import fin_faults
+from towtank.craft.fins import fin_faults, fin_root
 from towtank.errors import CraftError
 
 SIZE_RANGE = (0.1, 5.0)
@@ -16,15 +16,6 @@ ANGLE_RANGE = (10.0, 80.0)
 """Angles of X fins from the horizontal [deg]; nearer to a plane two neighbours stand in each other's way."""
 _PLANAR = 1e-6
 """Sine or cosine of an azimuth below which the fin lies in a plane of the craft."""
-
-
-def root_radius(craft: Craft, fin: Fin) -> float:
-    """Radius [m] at which the middle of the chord of ``fin`` meets the hull."""
-    y = fin.root_radius
-    for _ in range(20):
-        middle = float(fin.trailing_edge_at(y) - 0.5 * fin.chord(y))
-        y = 0.5 * (y + float(craft.profile.radius(np.array(middle))))
-    return y
 
 
 def scaled(craft: Craft, span: float, chord: float) -> Craft:
@@ -50,7 +41,7 @@ def scaled(craft: Craft, span: float, chord: float) -> Craft:
 
 
 def _scaled(craft: Craft, fin: Fin, span: float, chord: float) -> Fin:
-    y = root_radius(craft, fin)
+    y = fin_root(fin, craft.profile)[2]
     middle = 0.5 * (y + fin.tip_radius)
     stock = float(fin.trailing_edge_at(middle) - (1.0 - fin.hinge) * fin.chord(middle))
     return replace(

@@ -67,7 +67,7 @@ def evaluate(craft: Craft, tank: FastTank | None = None, trials: Sequence[str] =
     TowtankError
         A stage before the trials failed.
     """
-    model = Model(craft, _derived(replace(craft, mass=_WEIGHTLESS), tank or FastTank()))
+    model = model_of(craft, tank)
     made: dict[str, Trajectory] = {}
     notes: list[str] = []
     if trials and craft.fins:
@@ -82,6 +82,17 @@ def evaluate(craft: Craft, tank: FastTank | None = None, trials: Sequence[str] =
                 made[name] = trial
                 notes += [note for note in trial.provenance.get("notes", []) if note.startswith("Not trimmed")]
     return Evaluated(model, made, assess(model, tuple(made.values()), requirements=()), tuple(dict.fromkeys(notes)))
+
+
+def model_of(craft: Craft, tank: FastTank | None = None) -> Model:
+    """Model of ``craft`` from its standard plan towed in the fast tank. Variants of mass and CG share their tests.
+
+    Raises
+    ------
+    TowtankError
+        The tests or the fit failed.
+    """
+    return Model(craft, _derived(replace(craft, mass=_WEIGHTLESS), tank or FastTank()))
 
 
 @lru_cache(maxsize=8)

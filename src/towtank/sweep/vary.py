@@ -15,7 +15,7 @@ from towtank.craft.integrals import centre_of_buoyancy
 from towtank.craft.mass import as_rows, move_inertia
 from towtank.errors import CraftError, InputError
 from towtank.quantity import Quantity, si
-from towtank.sweep import fins
+from towtank.sweep import fins, strakes
 
 HEAVIEST = 0.5
 """Net weight over mass beyond which a craft does not stay submerged or does not stay up; that of the craft file."""
@@ -45,11 +45,12 @@ def _moved_cg(mass: Mass, x: float, y: float, z: float) -> Mass:
 def _in_trim(craft: Craft, before: Craft) -> Craft:
     """``craft`` with the CG moved along and across as the centre of buoyancy moved since ``before``.
 
-    Ballast shifted in the hull keeps the craft floating as it did; otherwise a fin's volume would change its trim.
+    Ballast shifted in the hull keeps the craft floating as it did; otherwise the volume of a fin or strake would change
+    its trim.
     """
-    if craft.fins == before.fins:
+    if (craft.fins, craft.strakes) == (before.fins, before.strakes):
         return craft
-    was, now = (centre_of_buoyancy(c.profile, c.fins) for c in (before, craft))
+    was, now = (centre_of_buoyancy(c.profile, c.fins, c.strakes) for c in (before, craft))
     x, y, z = craft.mass.cg
     return replace(craft, mass=_moved_cg(craft.mass, x - (now[1] - was[1]), y + (now[2] - was[2]), z))
 
@@ -127,6 +128,17 @@ KINDS: dict[str, Kind] = {
             "fin_position", "m", "root trailing edge of the aftmost fin aft of the nose; all fins move alike",
             fins.fin_position, fins.moved, in_lengths=True,
         ),
+        Kind("strake_height", "m", "height of the strakes at their end; 0 is none", strakes.height, strakes.raised),
+        Kind(
+            "strake_length", "m", "length of the strakes, their ends kept",
+            strakes.length, strakes.lengthened, in_lengths=True,
+        ),
+        Kind(
+            "strake_end", "m", "end of the aftmost strake aft of the nose; all strakes move alike",
+            strakes.end, strakes.shifted, in_lengths=True,
+        ),
+        Kind("strake_taper", "", "height of the strakes at their start over that at their end",
+             strakes.taper, strakes.tapered),
         Kind(
             "cg_x", "m", "centre of gravity forward of the body origin",
             lambda c: c.mass.cg[0], lambda c, x: _with_cg(c, 0, x), in_lengths=True,
@@ -140,12 +152,10 @@ KINDS: dict[str, Kind] = {
         Kind("speed", "m/s", "reference speed of tests and trials", lambda c: c.speed, _with_speed),
     )
 }  # fmt: skip
-"""What can be varied, in the order in which the changes of one variant are made: the fins first."""
+"""What can be varied, in the order in which the changes of one variant are made: fins, strakes, then the mass."""
 
-_ABSENT = {
-    "strakes": "a craft file knows no strakes yet: hull and fins are all that the tank sees",
-    "strake_size": "a craft file knows no strakes yet: hull and fins are all that the tank sees",
-}
+SHAPES = ("fin_", "strake_")
+"""How the names of changes of the shape begin."""
 
 
 def kind(name: str) -> Kind:
@@ -158,8 +168,6 @@ def kind(name: str) -> Kind:
     """
     if name in KINDS:
         return KINDS[name]
-    if name in _ABSENT:
-        raise InputError(f"{name} cannot be varied: {_ABSENT[name]}. Axes: {', '.join(KINDS)}.")
     near = difflib.get_close_matches(name, KINDS, n=1, cutoff=0.5)
     hint = f" Did you mean {near[0]}?" if near else ""
     raise InputError(f"{name!r} is nothing that can be varied.{hint} Axes: {', '.join(KINDS)}.")
@@ -188,22 +196,25 @@ def vary(craft: Craft, **changes: Quantity) -> Craft:
         lengths of the craft, ``"0.95 L"``. The order of the arguments has no effect.
 
     The body origin, the hull and the displaced mass stay, so that all variants are compared about one point and at
-    one buoyancy. Where other fins move the centre of buoyancy, the CG is moved along with it, as shifted ballast would
-    do, so that the craft floats as before; ``cg_x`` and ``cg_z`` are positions and come after. The craft given is
-    unchanged.
+    one buoyancy. Where other fins or strakes move the centre of buoyancy, the CG is moved along with it, as shifted
+    ballast would do, so that the craft floats as before; ``cg_x`` and ``cg_z`` are positions and come after. A craft
+    without strakes gets a set of them by ``strake_height`` (``towtank.sweep.strakes``). The craft given is unchanged.
 
     Raises
     ------
     InputError
         Unknown name, wrong unit, a speed that is not positive.
     CraftError
-        A variant that cannot be built: fins off the hull, a CG outside it, no fins or no X fins to vary, too heavy.
+        A variant that cannot be built: fins or strakes off the hull or in each other's way, a CG outside it, nothing
+        of the kind to vary, too heavy.
     """
     given = {name: number(craft, name, value) for name, value in changes.items()}
     before = craft
-    for name in (name for name in KINDS if name in given and name.startswith("fin_")):
+    if given.get("strake_height") == 0.0:  # without strakes the rest of their changes has no object
+        given = {name: value for name, value in given.items() if name == "strake_height" or "strake_" not in name}
+    for name in (name for name in KINDS if name in given and name.startswith(SHAPES)):
         craft = KINDS[name].change(craft, given[name])
-    craft = _in_trim(craft, before)
-    for name in (name for name in KINDS if name in given and not name.startswith("fin_")):
+    craft = _in_trim(craft if craft is before else strakes.standing(craft), before)
+    for name in (name for name in KINDS if name in given and not name.startswith(SHAPES)):
         craft = KINDS[name].change(craft, given[name])
     return craft

@@ -32,7 +32,7 @@ def run_ids(plan: Plan, tank: Tank) -> tuple[str, ...]:
 
 
 def wetted_shape(craft: Craft) -> dict[str, Any]:
-    """What the water feels of a craft: hull radii at fixed stations [m, rounded to 1e-9 L], fins, reference point."""
+    """What the water feels of a craft: hull radii at fixed stations [rounded to 1e-9 L], fins, strakes, origin."""
     length = craft.length
     radii = craft.profile.radius(np.linspace(0.0, length, _STATIONS)) / length
     return {
@@ -43,6 +43,7 @@ def wetted_shape(craft: Craft) -> dict[str, Any]:
         "fins": [{k: v for k, v in vars(fin).items() if k not in ACTUATOR} for fin in craft.fins],
         "origin": craft.origin_from_nose,
         "water": craft.water,
+        **({"strakes": craft.strakes} if craft.strakes else {}),
     }
 
 

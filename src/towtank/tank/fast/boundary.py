@@ -132,9 +132,24 @@ def velocity_profile(layer: BoundaryLayer, station: float, case: int) -> tuple[f
 def wake_factor(layer: BoundaryLayer, fin: Fin, case: int) -> float:
     """Mean of (u/U)^2 over the span of a fin, weighted with chord and an elliptic loading."""
     station = float(fin.trailing_edge_at(fin.half_radius) - 0.5 * fin.chord(fin.half_radius))
-    delta, n, r, edge = velocity_profile(layer, min(station, float(layer.x[-1])), case)
+    return mean_pressure(layer, station, lambda r: fin.tip_radius, case, fin.chord)
+
+
+def mean_pressure(
+    layer: BoundaryLayer,
+    station: float,
+    tip: Callable[[float], float],
+    case: int,
+    chord: Callable[[Array], Array] = np.ones_like,
+) -> float:
+    """Mean of (u/U)^2 from the hull to ``tip`` (of the hull's radius there) [m] at ``station`` [m aft of the nose].
+
+    Weighted with ``chord`` (of the radius) and an elliptic loading.
+    """
+    inside = float(np.clip(station, layer.x[0], layer.x[-1]))
+    delta, n, r, edge = velocity_profile(layer, inside, case)
     share = np.linspace(0.0, 1.0, 200)
-    y = r + (fin.tip_radius - r) * share
+    y = r + (tip(r) - r) * share
     u = np.clip((y - r) / delta, 0.0, 1.0) ** (1.0 / n) * edge
-    weight = fin.chord(y) * np.sqrt(np.clip(1.0 - share**2, 0.0, 1.0))
+    weight = chord(y) * np.sqrt(np.clip(1.0 - share**2, 0.0, 1.0))
     return float((weight * u * u).sum() / weight.sum())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from towtank.tank.fast.potential import (
     added_mass_with_fins,
     hull_flow,
 )
+from towtank.tank.fast.strakes import StrakeData, strake_data
 
 STRIPS = 48
 REYNOLDS_RANGE = np.geomspace(0.05, 3.0, 7)
@@ -32,10 +33,14 @@ SECTOR_STEP = 8
 
 @dataclass(frozen=True)
 class Build:
-    """A craft ready for the fast tank. ``layer`` is ahead, its last column at the design Reynolds number."""
+    """A craft ready for the fast tank. ``layer`` is ahead, its last column at the design Reynolds number.
+
+    strakes : None for a craft without.
+    """
 
     hull: HullData
     fins: tuple[FinData, ...]
+    strakes: StrakeData | None
     layer: BoundaryLayer
     reynolds: float
     panels: int
@@ -63,7 +68,7 @@ def build(craft: Craft, speed: float, resolution: float = 1.0) -> Build:
 
     resolution : factor on the number of panels each way, of strips and of stations of the boundary layer.
     """
-    flow, added = _solved(craft, resolution)
+    flow, added = _solved(replace(craft, strakes=()), resolution)
     length = craft.length
     design = craft.water.reynolds(speed, length)
     reynolds = np.append(REYNOLDS_RANGE, 1.0) * design
@@ -71,8 +76,10 @@ def build(craft: Craft, speed: float, resolution: float = 1.0) -> Build:
     layer = march(craft.profile.radius, length, reynolds, flow.panels.station, flow.surface_speed, steps)
     astern = _march_astern(craft, flow, design, steps)
     fins = tuple(_fin(craft, layer, index, speed) for index in range(len(craft.fins)))
+    strakes = strake_data(craft, layer, fins, speed, resolution) if craft.strakes else None
+    added = added if strakes is None else added + strakes.added
     hull = _hull(craft, flow, added, layer, astern, reynolds, _scaled(STRIPS, resolution))
-    return Build(hull, fins, layer, design, int(np.prod(flow.panels.shape)))
+    return Build(hull, fins, strakes, layer, design, int(np.prod(flow.panels.shape)))
 
 
 def _march_astern(craft: Craft, flow: HullFlow, design: float, steps: int) -> BoundaryLayer:

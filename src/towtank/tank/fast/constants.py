@@ -52,6 +52,14 @@ CONSTANTS = (
     Constant("fin_stall", 1.0, "factor on the stall angle of the fins", "", 0.12),
 )  # fmt: skip
 
+STRAKES = (
+    Constant("strake_lift", 1.0, "factor on the linear load of strakes (slender-body theory)", "", 0.15),
+    Constant("strake_crossflow", 2.0, "drag coefficient of the cross-flow that separates at the edges of strakes", "",
+             0.25),
+    Constant("strake_wash", 1.0, "factor on the wash of strakes at the fins", "", 0.40),
+)  # fmt: skip
+"""Constants that only a craft with strakes feels. They are drawn apart, so that the draws of the others stay."""
+
 NOMINAL: dict[str, float] = {item.name: item.value for item in CONSTANTS}
 
 
@@ -61,13 +69,17 @@ def sample(members: int, seed: int = 0) -> Mapping[str, Array]:
 
     Source     mckay1979: each constant takes every 1/members share of its distribution once.
     """
-    values = {item.name: np.full(members + 1, item.value) for item in CONSTANTS}
+    return MappingProxyType({**_drawn(CONSTANTS, members, (seed,)), **_drawn(STRAKES, members, (seed, 1))})
+
+
+def _drawn(constants: tuple[Constant, ...], members: int, seed: tuple[int, ...]) -> dict[str, Array]:
+    values = {item.name: np.full(members + 1, item.value) for item in constants}
     if members == 0:
-        return MappingProxyType(values)
-    rng = np.random.default_rng(seed)
-    ranks = rng.permuted(np.tile(np.arange(members), (len(CONSTANTS), 1)), axis=1)
-    normal = ndtri((ranks.T + rng.uniform(size=(members, len(CONSTANTS)))) / members)
-    for item, z in zip(CONSTANTS, normal.T, strict=True):
+        return values
+    rng = np.random.default_rng(seed[0] if len(seed) == 1 else list(seed))
+    ranks = rng.permuted(np.tile(np.arange(members), (len(constants), 1)), axis=1)
+    normal = ndtri((ranks.T + rng.uniform(size=(members, len(constants)))) / members)
+    for item, z in zip(constants, normal.T, strict=True):
         drawn = item.value + item.spread * z if item.additive else item.value * np.exp(item.spread * z)
         values[item.name][1:] = np.clip(drawn, *item.limits)
-    return MappingProxyType(values)
+    return values

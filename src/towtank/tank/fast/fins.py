@@ -181,12 +181,15 @@ def section_forces(angle: Array, data: FinData, p: Mapping[str, Array]) -> tuple
     return np.sign(angle) * (lift * cosine + drag * sine), np.where(reversed_, -chordwise, chordwise)
 
 
-def fin_load(data: FinData, record: MotionRecord, index: int, upstream: Array, p: Mapping[str, Array]) -> Array:
+def fin_load(
+    data: FinData, record: MotionRecord, index: int, upstream: Array, p: Mapping[str, Array], wash: Array | float = 0.0
+) -> Array:
     """Load (m, N, 6) of one fin and of what it carries over to the hull.
 
     Parameters
     ----------
     index : column of ``record.delta``.   upstream : cross-flow (m, N, 2) ahead of the fins, delayed [m/s].
+    wash : velocity (m, N) of the water along the lift, left by strakes [m/s].
 
     Source     whickerfehlner1958 and pitts1957, times the wake's dynamic pressure, less the sidewash of the hull
                (TANK notes, section 3.4). The interference fades with (u/V)^2.
@@ -202,7 +205,7 @@ def fin_load(data: FinData, record: MotionRecord, index: int, upstream: Array, p
     ahead = np.where(u > 0.0, u * u / speed2, 0.0)
     wake = 1.0 - (1.0 - np.minimum(data.wake * p["wake"], 1.0)[:, None]) * ahead
     sidewash = upstream[..., 0] * lift[1] + upstream[..., 1] * lift[2]
-    cross = local @ lift - p["sidewash"][:, None] * ahead * sidewash
+    cross = local @ lift - p["sidewash"][:, None] * ahead * sidewash - wash
     delta = record.delta[:, index]
     turned = np.where(ul >= 0.0, delta, -delta)
     angle = (1.0 + (data.kd - 1.0) * ahead) * turned - np.arctan2(
@@ -234,9 +237,17 @@ def _at(fx: Array, fl: Array, arm: Array, lift: Array) -> Array:
 
 
 def fins_load(
-    fins: tuple[FinData, ...], record: MotionRecord, length: float, bow: float, p: Mapping[str, Array]
+    fins: tuple[FinData, ...],
+    record: MotionRecord,
+    length: float,
+    bow: float,
+    p: Mapping[str, Array],
+    wash: Array | None = None,
 ) -> Array:
-    """Load (m, N, 6) of all fins. The upstream cross-flow is read half-way between bow and fins."""
+    """Load (m, N, 6) of all fins. The upstream cross-flow is read half-way between bow and fins.
+
+    wash : velocity (m, N, n_fins) along the lift of each fin, left by strakes [m/s]; None without.
+    """
     members = len(p["sidewash"])
     total = np.zeros((members, len(record.time), 6))
     lag = np.array([SIDEWASH_LAG * length])
@@ -244,5 +255,6 @@ def fins_load(
         x = 0.5 * (bow + data.x)
         vy = record.delayed(record.nu[:, 1] + x * record.nu[:, 5], lag)
         vz = record.delayed(record.nu[:, 2] - x * record.nu[:, 4], lag)
-        total = total + fin_load(data, record, index, np.stack([vy, vz], axis=-1), p)
+        upstream, left = np.stack([vy, vz], axis=-1), 0.0 if wash is None else wash[..., index]
+        total = total + fin_load(data, record, index, upstream, p, left)
     return total

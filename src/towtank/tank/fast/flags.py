@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from towtank.craft.hydrostatics import SLENDEREST
 from towtank.tank.fast.build import Build
 from towtank.tank.fast.constants import CONSTANTS
 from towtank.tank.fast.fins import stall_angle
 from towtank.tank.fast.motion import MotionRecord
+from towtank.tank.fast.strakes import TRIP
 
 STALL_DOUBT = next(item.spread for item in CONSTANTS if item.name == "fin_stall")
 """Relative standard deviation of a stall angle."""
@@ -34,6 +36,12 @@ def _shape_flags(body: Build) -> list[str]:
         ratio = 1.0 - np.sqrt(0.5 * data.aspect * data.area) / data.fin.tip_radius
         if ratio > 0.6:
             found.append(f"fin {data.fin.name}: hull radius over tip radius {ratio:.2f} above 0.6")
+    if body.strakes is not None and body.strakes.aspect > SLENDEREST:
+        found.append(
+            f"strakes: aspect ratio {body.strakes.aspect:.2f} above {SLENDEREST:g}: a fin rather than a strake"
+        )
+    if body.strakes is not None and body.strakes.lowest < TRIP:
+        found.append(f"strakes: height {body.strakes.lowest:.2f} hull radii below {TRIP:g}: they may lie in the layer")
     return found
 
 

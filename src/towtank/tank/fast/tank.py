@@ -14,7 +14,7 @@ from towtank.frames import Array
 from towtank.plan.kinds import CaptiveTest
 from towtank.plan.motion import sampled
 from towtank.progress import Progress
-from towtank.tank.fast import fins, hull
+from towtank.tank.fast import fins, hull, strakes
 from towtank.tank.fast.build import Build, build, panel_counts
 from towtank.tank.fast.constants import NOMINAL, sample
 from towtank.tank.fast.flags import flags
@@ -117,8 +117,13 @@ class FastTank:
         constants = {**sample(self.members, self.seed), "density": np.full(self.members + 1, body.hull.density)}
         names = POTENTIAL if self.parts == "potential" else tuple(HULL_PARTS)
         loads = {name: HULL_PARTS[name](body.hull, record, constants) for name in names}
-        if body.fins and self.parts == "all":
-            loads["fins"] = fins.fins_load(body.fins, record, body.hull.length, body.hull.bow, constants)
+        if self.parts == "potential":
+            return loads
+        wash = None
+        if body.strakes is not None:
+            loads["strakes"], wash = strakes.strakes_load(body.strakes, record, body.hull.length, constants)
+        if body.fins:
+            loads["fins"] = fins.fins_load(body.fins, record, body.hull.length, body.hull.bow, constants, wash)
         return loads
 
     def _record(self, craft: Craft, test: CaptiveTest) -> MotionRecord:

@@ -22,6 +22,7 @@ from towtank.tank.openfoam.case import Case, read_case, write_case
 from towtank.tank.openfoam.errors import with_model_form
 from towtank.tank.openfoam.find import require
 from towtank.tank.openfoam.formulation import Straight, domain_of
+from towtank.tank.openfoam.mesh.fins import refuse_strakes
 from towtank.tank.openfoam.mesh.grid import MeshSettings
 from towtank.tank.openfoam.mesh.imported import SurfaceMesh
 from towtank.tank.openfoam.mesh.snappy import SnappySettings
@@ -165,8 +166,9 @@ class OpenFoamTank:
         Raises
         ------
         InputError
-            The surface is not the craft, or a test cannot be run about it.
+            The craft has strakes, the surface is not the craft, or a test cannot be run about it.
         """
+        refuse_strakes(craft)
         if isinstance(self.mesh_settings, SurfaceMesh):
             self.mesh_settings.check(craft, tests)
         return schedule(craft, tests, self.mesh_settings, self.solution)
@@ -182,7 +184,10 @@ class OpenFoamTank:
         ------
         TankError
             OpenFOAM is missing, or the solver failed; what is on file stays for the next call.
+        InputError
+            The craft has strakes.
         """
+        refuse_strakes(craft)
         installation = require()
         with self._folder(craft, test) as folder:
             task = f"mesh {test.name}"

@@ -50,6 +50,24 @@ class Layout:
         return self.edges[1] - self.edges[0]
 
 
+def refuse_strakes(craft: Craft) -> None:
+    """See that ``craft`` has no strakes: the meshes know none, neither the structured one nor that of a surface.
+
+    Raises
+    ------
+    InputError
+        It has.
+    """
+    if craft.strakes:
+        thick = min(strake.thickness for strake in craft.strakes)
+        raise InputError(
+            f"craft {craft.name!r} has {len(craft.strakes)} strakes, and OpenFOAM cannot be given them: the structured "
+            "mesh holds hull and fins, and the cells about a surface are far larger than a plate "
+            f"{1e3 * thick:.3g} mm thick, which would be lost without a word. Run it in the fast tank (--tank fast), "
+            "bring results from elsewhere (towtank import), or tow the craft without its [[strake]] tables."
+        )
+
+
 def layout(craft: Craft, shape: Outline, turned: Sequence[float]) -> Layout | None:
     """Fins of ``craft`` turned by ``turned`` [rad]; None when ``turned`` is empty.
 

@@ -12,7 +12,7 @@ from towtank.craft.craft import Craft
 from towtank.errors import InputError, TankError
 from towtank.frames import Array
 from towtank.tank.openfoam.mesh.cap import Disc, cap_cells, disc
-from towtank.tank.openfoam.mesh.fins import Layout, Planes, even_planes, layout, planes
+from towtank.tank.openfoam.mesh.fins import Layout, Planes, even_planes, layout, planes, refuse_strakes
 from towtank.tank.openfoam.mesh.meridian import Outline, cap_limit, mesh_lines, outline, smooth_map
 from towtank.tank.openfoam.mesh.poly import Labels, PolyMesh, assemble
 from towtank.tank.openfoam.mesh.quality import cell_volumes, face_vectors
@@ -119,10 +119,11 @@ def mesh_of(
     Raises
     ------
     InputError
-        Too few cells, fins that do not fit, a half domain of a craft without that symmetry.
+        Strakes, too few cells, fins that do not fit, a half domain of a craft without that symmetry.
     TankError
         The mesh folds.
     """
+    refuse_strakes(craft)
     along, around, out = settings.counts()
     shape = outline(craft.profile, settings.far * craft.length)
     speed, viscosity = speed or craft.speed, craft.water.kinematic_viscosity

@@ -131,7 +131,7 @@ def check_fit(surface: Surface, craft: Craft) -> None:
     """
     low, high, centre = (np.array(item) for item in (surface.low, surface.high, surface.centre))
     nose, tail = craft.origin_from_nose, craft.origin_from_nose - craft.length
-    _, along, y, z = centre_of_buoyancy(craft.profile, craft.fins)
+    _, along, y, z = centre_of_buoyancy(craft.profile, craft.fins, craft.strakes)
     limit = PLACE * craft.length
     found = np.array([high[0], low[0], *centre])
     wanted = np.array([nose, tail, nose - along, y, z])
