@@ -220,42 +220,51 @@ def read_study(folder: Path | str) -> Study:
             return empty
 
     from towtank.craft.library import read_craft
-    from towtank.derive.files import read_derivatives
-    from towtank.derive.study_files import read_frequencies
-    from towtank.design.cruise import read_cruise
-    from towtank.design.files import read_design
-    from towtank.experiments.files import own_plan, read_optimal
-    from towtank.grid.files import read_grid
-    from towtank.montecarlo.files import read_mc
+    from towtank.experiments.files import own_plan
     from towtank.plan.files import read_plan
-    from towtank.trials.jammed_files import read_jammed
-    from towtank.verdict.files import read_verdict
 
-    files = {name: root / name for name in ("craft.toml", "plan.toml", "runs", "derivatives.json", "trials")}
+    files = {name: root / name for name in ("craft.toml", "plan.toml", "trials")}
     craft = attempt("craft", files["craft.toml"], lambda: read_craft(files["craft.toml"]))
     plan = attempt("plan", files["plan.toml"], lambda: read_plan(files["plan.toml"], craft)) if craft else None
     study = Study(
         craft=craft,
         plan=plan,
         runs=_in_plan(plan, _runs(root, attempt)),
-        derivatives=attempt(
-            "derivatives", files["derivatives.json"], lambda: read_derivatives(files["derivatives.json"])
-        ),
-        frequency=attempt("frequency", root / "frequency.json", lambda: read_frequencies(root / "frequency.json")),
         trajectories=attempt("trials", files["trials"], lambda: _trajectories(files["trials"]), ()),
-        mc=attempt("mc", root / "mc.json", lambda: read_mc(root)),
-        jammed=attempt("faults", root / "faults.json", lambda: read_jammed(root / "faults.json")),
-        verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
-        design=attempt("design", root / "design.json", lambda: read_design(root / "design.json")),
-        cruise=attempt("design", root / "cruise.json", lambda: read_cruise(root / "cruise.json")),
         index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
-        grid=attempt("grid", root / "grid.json", lambda: read_grid(root / "grid.json")),
-        optimal=attempt("plan", root / "optimal.json", lambda: read_optimal(root / "optimal.json"), {}),
+        **_results(root, attempt),
     )
     if study.optimal and not own_plan(root):
         words = "plan.toml is not the plan of optimal.json, which is left out."
         study = replace(study, optimal={}, remarks=(*study.remarks, words))
     return completed(replace(study, problems=tuple(problems), remarks=(*study.remarks, *_of_another_craft(study))))
+
+
+def _results(root: Path, attempt: Callable[..., Any]) -> dict[str, Any]:
+    """Parts of the study that are one file each."""
+    from towtank.derive.files import read_derivatives
+    from towtank.derive.study_files import read_frequencies
+    from towtank.design.cruise import read_cruise
+    from towtank.design.files import read_design
+    from towtank.experiments.files import read_optimal
+    from towtank.grid.files import read_grid
+    from towtank.montecarlo.files import read_mc
+    from towtank.trials.jammed_files import read_jammed
+    from towtank.verdict.files import read_verdict
+
+    known: tuple[tuple[str, str, str, Callable[[Path], Any]], ...] = (
+        ("derivatives", "derivatives", "derivatives.json", read_derivatives),
+        ("frequency", "frequency", "frequency.json", read_frequencies),
+        ("mc", "mc", "mc.json", lambda path: read_mc(path.parent)),
+        ("jammed", "faults", "faults.json", read_jammed),
+        ("verdict", "verdict", "verdict.json", read_verdict),
+        ("design", "design", "design.json", read_design),
+        ("cruise", "design", "cruise.json", read_cruise),
+        ("grid", "grid", "grid.json", read_grid),
+    )
+    found = {part: attempt(stage, root / name, partial(read, root / name)) for part, stage, name, read in known}
+    optimal = root / "optimal.json"
+    return found | {"optimal": attempt("plan", optimal, partial(read_optimal, optimal), {})}
 
 
 def _of_another_craft(study: Study) -> list[str]:
