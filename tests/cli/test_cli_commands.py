@@ -23,6 +23,8 @@ COMMANDS = (
     "status",
     "derive",
     "trial",
+    "pilot",
+    "tune",
     "mc",
     "assess",
     "report",

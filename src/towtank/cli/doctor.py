@@ -118,6 +118,7 @@ def _optional() -> list[dict[str, Any]]:
 
     return [
         _item("casadi", _version_of("casadi"), False, "compiles other forms of the engine", "pip install casadi"),
+        _item("control", _version_of("control"), False, "robust margins, tuning", 'pip install "towtank[control]"'),
         _item("C compiler", compiler() or "", False, "the same", "apt-get install gcc, or your system's compiler"),
         _openfoam(),
     ]
