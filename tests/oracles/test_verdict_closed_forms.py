@@ -135,7 +135,7 @@ def test_turns_of_many_craft_are_those_found_one_by_one(case: str):
         np.testing.assert_allclose(turns.rudder[i, got], each.rudder, atol=1e-6)
         np.testing.assert_allclose(turns.rate[i, got], each.rate, rtol=1e-5, atol=1e-8)
         assert width[i] == pytest.approx(each.rudder_span(), abs=1e-6)
-        assert height[i] == pytest.approx(2.0 * each.free_rate(), abs=1e-6)
+        assert height[i] == pytest.approx(each.rate_span(), abs=1e-6)
 
 
 def test_a_stable_craft_has_no_loop():

@@ -18,13 +18,13 @@ from towtank.verdict.many import Many, masses
 LARGEST, POINTS = 0.6, 25
 """Largest yaw rate r L/u and number of points of a side, as in ``towtank.trials.steady``."""
 ROWS = [0, 1, 5]
-"""Surge, sway, yaw: the accelerations that are zero."""
+"""Surge, sway, yaw: the loads that are zero."""
 NUDGE = 1e-6
 """Step of the slopes. The residual is of second degree in the unknowns, so the error of a slope is of this size."""
 MIRROR = np.array([1.0, -1.0, -1.0])[:, None, None]
 """Surge, sway, yaw or u, v, rudder of the turn to the other side."""
 SETTLED, NEWTON = 1e-9, 12
-"""Largest residual of a solution, in U2/L and U2/L2; most iterations for a point."""
+"""Largest residual of a solution, as accelerations in U2/L and U2/L2; most iterations for a point."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ class ManyTurns:
     def loop(self) -> tuple[Array, Array]:
         """Width [rad of rudder] and height [rad/s] (n,) of the instability loop; 0 where the curve is single-valued.
 
-        Source     As ``SteadyTurns.rudder_span`` and twice ``free_rate``: extremes of the rudder, rate at no rudder.
+        Source     As ``SteadyTurns.rudder_span`` and ``rate_span``: the first fold to either side of straight flight,
+                   rates that need no rudder.
         """
         width, height = np.full(len(self.rudder), np.nan), np.full(len(self.rudder), np.nan)
         there = np.isfinite(self.rudder)
@@ -51,15 +52,14 @@ class ManyTurns:
             rows = np.flatnonzero((there == pattern).all(axis=1))
             x = self.curvature[pattern]
             rudder, rate = (CubicSpline(x, values[rows][:, pattern].T) for values in (self.rudder, self.rate))
-            folds = _at(rudder, _padded(rudder.derivative().roots(extrapolate=False)))
-            free = np.abs(_at(rate, _padded(rudder.roots(extrapolate=False))))
-            width[rows] = np.where(_several(folds), np.fmax.reduce(folds, 1) - np.fmin.reduce(folds, 1), 0.0)
-            height[rows] = np.where(_several(free), 2.0 * np.fmax.reduce(free, 1), 0.0)
+            folds = _padded(rudder.derivative().roots(extrapolate=False))
+            port = np.fmax.reduce(np.where(folds < 0.0, folds, np.nan), axis=1)
+            starboard = np.fmin.reduce(np.where(folds > 0.0, folds, np.nan), axis=1)
+            ends = _at(rudder, np.stack([port, starboard], axis=-1))
+            free = _at(rate, _padded(rudder.roots(extrapolate=False)))
+            width[rows] = np.nan_to_num(np.abs(ends[:, 1] - ends[:, 0]))
+            height[rows] = np.nan_to_num(np.fmax.reduce(free, axis=1) - np.fmin.reduce(free, axis=1))
         return width, height
-
-
-def _several(values: Array) -> NDArray[np.bool_]:
-    return np.asarray(np.count_nonzero(np.isfinite(values), axis=1) > 1)
 
 
 def _padded(roots: np.ndarray[tuple[int], np.dtype[np.object_]]) -> Array:
@@ -81,8 +81,8 @@ def _at(spline: CubicSpline, x: Array) -> Array:
 def many_turns(craft: Many, speed: float, points: int = POINTS) -> ManyTurns:
     """Steady turns of every craft at the thrust of the best estimate at ``speed`` [m/s].
 
-    Source     As ``towtank.trials.steady.steady_turns``: zero accelerations u, v, r at given curvature, w, p, q, phi
-               and theta zero. Newton's method on all craft at once, from the point before on the curve.
+    Source     As ``towtank.trials.steady.steady_turns``: zero loads X, Y, N at given curvature, w, p, q, phi and theta
+               zero. Newton's method on all craft at once, from the point before on the curve.
     Departure  A free-running craft pitches and rolls in a turn; fins are not limited.
     """
     residual = _Residual(craft, speed)
@@ -128,7 +128,7 @@ def _solve(residual: _Residual, guess: Array, curvature: float) -> tuple[Array, 
 
 
 class _Residual:
-    """Accelerations in surge, sway and yaw of n craft in a steady turn, in U2/L, U2/L and U2/L2."""
+    """Loads X, Y, N of n craft in a steady turn over their masses, in U2/L, U2/L and U2/L2."""
 
     def __init__(self, craft: Many, speed: float) -> None:
         model, length = craft.model, craft.model.craft.length
@@ -136,7 +136,9 @@ class _Residual:
         self.length = length
         self.mixing = [float(share) for share in model.craft.mixing[:, 0]]
         size = np.array([speed, speed, speed / length]) * speed / length
-        self.inverse = np.linalg.inv(masses(model, craft.columns))[:, ROWS, :] / size[:, None]
+        self.mass = (
+            np.diagonal(masses(model, craft.columns), axis1=1, axis2=2)[:, ROWS].T[:, None, :] * size[:, None, None]
+        )
 
     def __call__(self, x: Array, curvature: float) -> Array:
         """Residual (3, k, n) at x (3, k, n): u/U, v/U, rudder [rad]."""
@@ -144,12 +146,12 @@ class _Residual:
         zero = np.zeros_like(u)
         nu, delta = [u, v, zero, zero, zero, curvature * u], [share * rudder for share in self.mixing]
         load = total_load(self.k, nu, LEVEL, delta, self.thrust, NUMPY)
-        return np.asarray(np.einsum("nij,jkn->ikn", self.inverse, np.array([zero + part for part in load])))
+        return np.array([zero + load[row] for row in ROWS]) / self.mass
 
     def mirrored(self) -> bool:
         """True when turns to port are the mirror image of those to starboard, for every craft."""
         at = np.array([0.9, 0.1, 0.2])[:, None, None]
-        x, curvature = np.broadcast_to(at, (3, 1, len(self.inverse))), 0.3 / self.length
+        x, curvature = np.broadcast_to(at, self.mass.shape), 0.3 / self.length
         there, back = self(x, curvature), MIRROR * self(MIRROR * x, -curvature)
         return bool(np.allclose(there, back, rtol=0.0, atol=SETTLED * max(float(np.abs(there).max()), 1.0)))
 
