@@ -13,6 +13,7 @@ import pytest
 
 from towtank.craft.library import read_craft
 from towtank.derive.derive import derive
+from towtank.engine.clock import clock_of
 from towtank.engine.plan import Ended
 from towtank.errors import InputError, TowtankError
 from towtank.figures.montecarlo import channel_fan
@@ -21,7 +22,7 @@ from towtank.montecarlo import study as study_module
 from towtank.montecarlo.craft import read_population
 from towtank.montecarlo.draw import Tolerances, draw, tolerances
 from towtank.montecarlo.files import read_mc, std_of, write_mc, write_std
-from towtank.montecarlo.fly import Piece, Study, fly_drawn, fly_piece, gathered, pieces
+from towtank.montecarlo.fly import Piece, Study, drawn_clock, fly_drawn, fly_piece, gathered, pieces, record
 from towtank.montecarlo.result import MonteCarlo
 from towtank.montecarlo.study import monte_carlo, study_of
 from towtank.plan.standard import standard_plan
@@ -39,6 +40,7 @@ from towtank.trials.start import ballasted
 from towtank.trials.straight import straight_ready
 from towtank.trials.zigzag import zigzag_ready
 from towtank.verdict.criteria import plane_criteria
+from towtank.verdict.flights import sound_readings
 from towtank.verdict.spread import quantiles, spread_of, wilson
 
 
@@ -103,11 +105,36 @@ def test_without_uncertainty_every_craft_is_the_best_estimate_and_flies_as_it_do
             # 1e-9: packs take their own sines, one trajectory the C library's; they differ in the last digits only.
             np.testing.assert_allclose(s.best, value, rtol=1e-9, atol=1e-9, err_msg=name)
             if s.share:
-                np.testing.assert_allclose([s.mean, *s.quantiles], value, rtol=1e-9, atol=1e-9, err_msg=name)
+                # Drawn craft take longer steps: what that changes has a law of its own below.
+                np.testing.assert_allclose([s.mean, *s.quantiles], value, rtol=2e-3, atol=2e-3, err_msg=name)
                 assert s.std <= 1e-9 * max(abs(value), 1.0)
             assert s.drivers == ()
     for plane in found.planes.values():
         assert plane.probability == float(plane.growth.best < 0.0)
+
+
+def test_longer_steps_of_drawn_craft_are_small_beside_the_spread(hokie: Model):
+    drawn = draw(hokie, 40, seed=8)
+    for model, trial in several(hokie):
+        clock = drawn_clock(model, trial.setting.speed)
+        assert clock.steps < clock_of(model, trial.setting.speed).steps
+        few, all_ = (
+            sound_readings(model, trial, fly_drawn(model, trial, drawn, kept=record(model, trial, False), clock=c))
+            for c in (clock, None)
+        )
+        for name, (values, _) in all_.items():
+            spread = np.nanstd(values[1:])
+            if spread > 1e-5 * np.nanmax(np.abs(values)):  # else it is round-off, as the roll of a craft held upright
+                error = np.abs(few[name][0] - values)
+                np.testing.assert_array_equal(np.isnan(error), np.isnan(values))
+                assert np.nanmax(error) < 0.05 * spread, name
+
+
+def test_fins_without_a_slow_lag_keep_their_steps(hokie: Model):
+    quick = replace(hokie.craft.fins[0], time_constant=0.04)
+    craft = replace(hokie.craft, fins=(quick, *hokie.craft.fins[1:]))
+    # A step of half a lag, 0.02 s of the period's 0.1 s.
+    assert drawn_clock(replace(hokie, craft=craft), 1.0).steps == 5
 
 
 def test_a_small_spread_scales_with_the_covariance(hokie: Model):

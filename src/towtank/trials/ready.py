@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from towtank.engine.clock import clock_of
 from towtank.engine.flights import Flights
-from towtank.engine.plan import Ended, Gauge, Leg, Log, Stat
+from towtank.engine.plan import Clock, Ended, Gauge, Leg, Log, Stat
 from towtank.engine.run import ONE, Ensemble, fly
 from towtank.engine.start import at
 from towtank.frames import Array
@@ -60,13 +60,15 @@ class Ready:
 
 
 def fly_ready(
-    model: Model, trial: Ready, ensemble: Ensemble = ONE, *, record: bool | Log = True, **options: Any
-) -> Flights:
+    model: Model, trial: Ready, ensemble: Ensemble = ONE, *, record: bool | Log = True, clock: Clock | None = None,
+    **options: Any,
+) -> Flights:  # fmt: skip
     """Fly ``trial``. ``options`` go to ``towtank.engine.run.fly``.
 
-    record : True keeps all channels at its interval, False nothing, a ``Log`` what it says.
+    record : True keeps all channels at its interval, False nothing, a ``Log`` what it says.   clock : ``clock_of`` the
+    trial's speed when left out.
     """
-    clock = clock_of(model, trial.setting.speed)
+    clock = clock or clock_of(model, trial.setting.speed)
     state = trial.setting.state if trial.start is None else trial.start
     every = Log(every=max(1, round(trial.interval / clock.tick)))
     log = record if isinstance(record, Log) else every if record else None
