@@ -15,6 +15,7 @@ import pytest
 from towtank import FastTank, Model, assess, derive, read_craft, standard_plan, tow
 from towtank.craft.craft import Craft
 from towtank.craft.integrals import centre_of_buoyancy, fin_integrals
+from towtank.derive.straightening import with_straightening
 from towtank.errors import CraftError, InputError
 from towtank.sweep.files import csv_text, read_sweep, write_sweep
 from towtank.sweep.point import evaluate, numbers
@@ -212,7 +213,8 @@ def test_the_point_of_all_bases_is_the_plain_chain():
     craft = read_craft("hokie")
     sweep = Sweep(craft, (Axis("fin_size", (1.0,)), Axis("cg_x", (craft.mass.cg[0],)), Axis("speed", (craft.speed,))))
     found = {name: value for name, (value, _) in numbers(evaluate(sweep.craft_at(sweep.points()[0]))).items()}
-    model = Model(craft, derive(tow(standard_plan(craft), FastTank())))
+    derived = derive(tow(standard_plan(craft), FastTank()))
+    model = Model(craft, with_straightening(derived, craft, FastTank()))
     trials = {trial.kind: trial for trial in standard_trials(model)}
     verdict = assess(model, tuple(trials.values()))
     assert found["G_h"] == pytest.approx(verdict.horizontal.index, rel=1e-12)
