@@ -64,7 +64,7 @@ def report(path: str | Path, *things: Any, title: str = "") -> Path:
     ----------
     path : file to be written.
     things : Craft, Plan, Run, GridStudy, Derivatives, FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins,
-        Verdict, DesignStudy, Cruise, or sequences of them, in any order. A stage that is not given is named in the page.
+        Verdict, DesignStudy, Cruise, or sequences of them, in any order. A stage that is absent is named in the page.
     title : of the page; the craft's own when left out.
 
     Returns

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -210,11 +209,11 @@ def read_study(folder: Path | str) -> Study:
         raise ArtefactError(f"{root} is not a folder. Give the study folder that `towtank run` wrote, with --out DIR.")
     problems: list[tuple[str, str]] = []
 
-    def attempt(stage: str, there: Path, read: Callable[[], Any], empty: Any = None) -> Any:
+    def attempt(stage: str, there: Path, read: Callable[[Path], Any], empty: Any = None) -> Any:
         if not there.exists():
             return empty
         try:
-            return read()
+            return read(there)
         except TowtankError as error:
             problems.append((stage, str(error)))
             return empty
@@ -231,26 +230,23 @@ def read_study(folder: Path | str) -> Study:
     from towtank.trials.jammed_files import read_jammed
     from towtank.verdict.files import read_verdict
 
-    files = {name: root / name for name in ("craft.toml", "plan.toml", "runs", "derivatives.json", "trials")}
-    craft = attempt("craft", files["craft.toml"], lambda: read_craft(files["craft.toml"]))
-    plan = attempt("plan", files["plan.toml"], lambda: read_plan(files["plan.toml"], craft)) if craft else None
+    craft = attempt("craft", root / "craft.toml", read_craft)
+    plan = attempt("plan", root / "plan.toml", lambda path: read_plan(path, craft)) if craft else None
     study = Study(
         craft=craft,
         plan=plan,
         runs=_in_plan(plan, _runs(root, attempt)),
-        derivatives=attempt(
-            "derivatives", files["derivatives.json"], lambda: read_derivatives(files["derivatives.json"])
-        ),
-        frequency=attempt("frequency", root / "frequency.json", lambda: read_frequencies(root / "frequency.json")),
-        trajectories=attempt("trials", files["trials"], lambda: _trajectories(files["trials"]), ()),
-        mc=attempt("mc", root / "mc.json", lambda: read_mc(root)),
-        jammed=attempt("faults", root / "faults.json", lambda: read_jammed(root / "faults.json")),
-        verdict=attempt("verdict", root / "verdict.json", lambda: read_verdict(root / "verdict.json")),
-        design=attempt("design", root / "design.json", lambda: read_design(root / "design.json")),
-        cruise=attempt("design", root / "cruise.json", lambda: read_cruise(root / "cruise.json")),
-        index=attempt("trials", files["trials"] / "index.json", lambda: _index(files["trials"]), {}),
-        grid=attempt("grid", root / "grid.json", lambda: read_grid(root / "grid.json")),
-        optimal=attempt("plan", root / "optimal.json", lambda: read_optimal(root / "optimal.json"), {}),
+        derivatives=attempt("derivatives", root / "derivatives.json", read_derivatives),
+        frequency=attempt("frequency", root / "frequency.json", read_frequencies),
+        trajectories=attempt("trials", root / "trials", _trajectories, ()),
+        mc=attempt("mc", root / "mc.json", lambda path: read_mc(root)),
+        jammed=attempt("faults", root / "faults.json", read_jammed),
+        verdict=attempt("verdict", root / "verdict.json", read_verdict),
+        design=attempt("design", root / "design.json", read_design),
+        cruise=attempt("design", root / "cruise.json", read_cruise),
+        index=attempt("trials", root / "trials" / "index.json", lambda path: _index(path.parent), {}),
+        grid=attempt("grid", root / "grid.json", read_grid),
+        optimal=attempt("plan", root / "optimal.json", read_optimal, {}),
     )
     if study.optimal and not own_plan(root):
         words = "plan.toml is not the plan of optimal.json, which is left out."
@@ -281,7 +277,7 @@ def _runs(root: Path, attempt: Callable[..., Any]) -> tuple[Run, ...]:
     recorded = _recorded(root)
     found = (path for path in root.glob("runs/*/run.nc") if not recorded or path.parent.name in recorded)
     for path in sorted(found, key=lambda path: path.stat().st_mtime):
-        run = attempt("runs", path, partial(read_run, path))
+        run = attempt("runs", path, read_run)
         if run is not None:
             latest[run.name] = run
     return tuple(latest.values())
