@@ -116,7 +116,28 @@ def test_the_best_is_no_worse_than_any_point_that_meets_the_goals(studied: Calla
     met = [p for p in study.done if all_met(study.goals, p.values)]
     assert study.best in met
     assert study.best is not None
-    assert study.best.values["drag"] == min(p.values["drag"] for p in met)
+    least = min(p.values["drag"] for p in met)
+    assert study.best.values["drag"] <= least * (1.0 + run.WORTH)
+    assert not [
+        p for p in met if p.values["drag"] <= least * (1.0 + run.WORTH) and len(p.changes) < len(study.best.changes)
+    ]
+
+
+def test_a_change_that_saves_next_to_nothing_is_not_made(studied: Callable[..., DesignStudy]) -> None:
+    """Height so cheap in drag by itself, but of so little effect, that the least drag has a trace of it."""
+
+    def work(question: Question, changes: Changes) -> dict[str, Any]:
+        named = dict(changes)
+        span, height = named.get("fin_span", 1.0) - 1.0, named.get("strake_height", 0.0)
+        values = law((("fin_span", 1.0 + span),)) | {"drag": 38.0 + 3.0 * span + 40.0 * height**2 + 0.5 * height}
+        growth = 0.1 - 0.08 * span - 0.02 * height
+        values |= {"growth_h_quantile": growth, "P_stable_h": 0.96 if growth <= 0.0 else 0.94}
+        return {"values": values, "units": dict.fromkeys(values, ""), "notes": []}
+
+    study = studied(work, evaluations=60)
+    assert study.best is not None
+    # d(drag)/d(height) = 80 h + 0.5 against 3 * 0.02 / 0.08 = 0.75: the optimum has h = 3 mm and saves 0.4 mN.
+    assert dict(study.best.changes) == {"fin_span": pytest.approx(2.25, abs=0.02)}
 
 
 def test_one_change_alone_is_taken_as_far_as_it_must(studied: Callable[..., DesignStudy]) -> None:
@@ -135,7 +156,8 @@ def test_a_limit_of_shape_is_kept(studied: Callable[..., DesignStudy]) -> None:
     study = studied(reach=0.69, evaluations=60)
     assert study.best is not None
     assert study.best.values["reach"] <= 0.69
-    assert study.best.values["drag"] == pytest.approx(38.0 + 3.0 * 0.2857**2 + 20.0 * (0.2 - 0.16 * 0.2857), rel=1e-3)
+    # The search keeps 0.2 % off a limit of shape, which is 0.05 N here.
+    assert study.best.values["drag"] == pytest.approx(38.0 + 3.0 * 0.2857**2 + 20.0 * (0.2 - 0.16 * 0.2857), rel=2e-3)
     free = studied(evaluations=60)
     assert free.best is not None
     assert study.best.values["drag"] > free.best.values["drag"]

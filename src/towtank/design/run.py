@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -38,8 +38,15 @@ REFINEMENTS = 6
 """Points spent on where one change alone meets the goals."""
 REFUSED = 2.0
 """Drag over that of the craft as given that the search is told of a variant that cannot be built."""
+SMALL, WORTH = 0.1, 2e-3
+"""A change of less than this share of its range is tried without; it is left out where that costs less than this share
+of drag."""
+FURTHER, EDGE = 1.25, 2e-3
+"""Changes are taken so many times as far, or as little far, to where the goals are just met; within so much of it."""
 NEAR = 1e-4
 """Distance to a bound, in shares of the range, within which the bound itself is taken."""
+INSIDE, INSIDE_SHAPE = 0.003, 0.002
+"""Margins that the search asks for, of smooth goals and of others: it ends on its bound, within its last step."""
 FIRST_STEP, LAST_STEP = 0.2, 0.01
 """Steps of the search in shares of the ranges: the first, and the one at which it ends."""
 
@@ -173,7 +180,8 @@ def run_design(
     told.many([changes for line in lines.values() for changes in line] + grid)
     alone = {axis.name: _alone(told, axis, lines[axis.name], goals) for axis in axes}
     _search(told, axes, given, goals, evaluations)
-    best = _cheapest(told.points.values(), goals)
+    _polish(told, axes, given, goals)
+    best = _simplest(list(told.points.values()), goals)
     named = [point.changes for point in (base, best, *alone.values()) if point is not None]
     told.trials(named)
     return DesignStudy(
@@ -211,9 +219,59 @@ def _line(axes: Sequence[Axis], axis: Axis, base: float) -> list[Changes]:
     return [(*beside, (axis.name, value)) for value in axis.values]
 
 
-def _cheapest(points: Any, goals: Sequence[Goal]) -> Point | None:
+def _cheapest(points: Collection[Point], goals: Sequence[Goal]) -> Point | None:
     met = [point for point in points if not point.failed and all_met(goals, point.values)]
     return min(met, key=lambda point: float(point.values["drag"]), default=None)
+
+
+def _simplest(points: Collection[Point], goals: Sequence[Goal]) -> Point | None:
+    """Of the points that meet the goals for hardly more than the least drag, the one with the fewest changes."""
+    least = _cheapest(points, goals)
+    if least is None:
+        return None
+    limit = (1.0 + WORTH) * least.values["drag"]
+    met = [p for p in points if not p.failed and all_met(goals, p.values) and p.values["drag"] <= limit]
+    return min(met, key=lambda point: (len(point.changes), point.values["drag"]))
+
+
+def _polish(told: Evaluator, axes: Sequence[Axis], given: Mapping[str, float], goals: Sequence[Goal]) -> None:
+    """Take the best point, all its changes alike, to where it just meets the goals; then without each small change.
+
+    Source     Brent's method on the least margin along the line from the craft as given.
+    """
+    done = [point for point in told.points.values() if not point.failed]
+    start = _cheapest(done, goals) or max(done, key=lambda point: least_margin(goals, point.values))
+    _to_the_edge(told, axes, given, goals, start.changes)
+    best = _cheapest(list(told.points.values()), goals)
+    if best is None:
+        return
+    for axis in axes:
+        change = dict(best.changes).get(axis.name, given[axis.name]) - given[axis.name]
+        if math.isfinite(change) and 0.0 < abs(change) <= SMALL * (max(axis.values) - min(axis.values)):
+            _to_the_edge(told, axes, given, goals, tuple(item for item in best.changes if item[0] != axis.name))
+
+
+def _to_the_edge(
+    told: Evaluator, axes: Sequence[Axis], given: Mapping[str, float], goals: Sequence[Goal], changes: Changes
+) -> None:
+    """Ask for the point on the line through ``changes`` where the least margin is zero, from the side that meets it."""
+    steps = [(axis, value) for axis in axes for name, value in changes if name == axis.name]
+
+    def margin(t: float) -> float:
+        point = told.one(tuple((axis.name, _further(axis, given[axis.name], value, t)) for axis, value in steps))
+        return -1.0 if point.failed else least_margin(goals, point.values)
+
+    if not steps:
+        return
+    low, high = (1.0 / FURTHER, 1.0) if margin(1.0) >= 0.0 else (1.0, FURTHER)
+    if margin(low) < 0.0 < margin(high):
+        margin(brentq(margin, low, high, xtol=EDGE, maxiter=REFINEMENTS, disp=False) + EDGE)
+
+
+def _further(axis: Axis, base: float, value: float, t: float) -> float:
+    """``value`` moved from ``base`` to ``t`` times its distance, within the range; as it is where there is no base."""
+    moved = base + t * (value - base) if math.isfinite(base) else value
+    return float(np.clip(moved, min(axis.values), max(axis.values)))
 
 
 def _alone(told: Evaluator, axis: Axis, line: list[Changes], goals: Sequence[Goal]) -> Point | None:
@@ -280,7 +338,7 @@ def _search(
     try:
         minimize(
             drag, (_place(axes, given, start) - low) / span, method="COBYQA", bounds=Bounds(0.0, 1.0),
-            constraints=NonlinearConstraint(margins, 0.0, np.inf),
+            constraints=NonlinearConstraint(margins, [INSIDE if g.smooth else INSIDE_SHAPE for g in goals], np.inf),
             options={"maxfev": evaluations, "initial_tr_radius": FIRST_STEP, "final_tr_radius": LAST_STEP},
         )  # fmt: skip
     finally:
