@@ -9,6 +9,7 @@ import numpy as np
 from towtank.engine.flights import Flights
 from towtank.engine.plan import Gauge, Stat
 from towtank.errors import InputError
+from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.pilot.law import Pilot
 from towtank.pilot.orders import Orders
@@ -114,17 +115,21 @@ def _lasting(steps: int, convective: float) -> list[float]:
     return [(FIRST if i in (0, len(HELD)) else EACH) * convective for i in range(steps)]
 
 
-def _measured(flights: Flights, steps: int, i: int) -> SteadyTurns | None:
-    """The curve of craft ``i`` from the steps it held; None where it did not go through all, or held too few."""
+def _means(flights: Flights, steps: int) -> Array:
+    """Rudder, rate, speed ahead, drift in every step, and the share of it at a limit of the fins: (5, N, steps)."""
     legs = [f"step {k}" for k in range(steps)]
-    lasting = np.array([flights.duration(leg)[i] for leg in legs])
-    if not np.all(np.isfinite(lasting)):
+    lasting = np.stack([flights.duration(leg) for leg in legs], axis=-1)
+    watched = [*((gauge, Stat.INTEGRAL) for gauge in _GAUGES), (FIN_USE, Stat.ABOVE)]
+    sums = [np.stack([flights.stat(leg, gauge, stat) for leg in legs], axis=-1) for gauge, stat in watched]
+    return np.array(sums) / lasting
+
+
+def _measured(means: Array) -> SteadyTurns | None:
+    """The curve of one craft from its ``means`` (5, steps); None where it did not go through all, or held too few."""
+    if not np.all(np.isfinite(means)):
         return None
-    rudder, rate, ahead, drift = (
-        np.array([flights.stat(leg, gauge, Stat.INTEGRAL)[i] for leg in legs]) / lasting for gauge in _GAUGES
-    )
-    at_limit = np.array([flights.stat(leg, FIN_USE, Stat.ABOVE)[i] for leg in legs]) / lasting
-    at_limit[[*range(len(HELD)), *range(steps - len(HELD), steps)]] = 0.0
+    rudder, rate, ahead, drift, at_limit = means.copy()
+    at_limit[: len(HELD)] = at_limit[len(at_limit) - len(HELD) :] = 0.0
     curvature = rate / ahead
     order = np.argsort(curvature)
     order = order[at_limit[order] < LET_GO]
@@ -134,7 +139,7 @@ def _measured(flights: Flights, steps: int, i: int) -> SteadyTurns | None:
 
 
 def _indices(flights: Flights, steps: int) -> Readings:
-    curves = [_measured(flights, steps, i) for i in range(len(flights))]
+    curves = [_measured(means) for means in np.moveaxis(_means(flights, steps), 1, 0)]
     width, height, slope = (np.array([np.nan if c is None else read(c) for c in curves]) for read in _READ)
     return {
         "loop_width": (np.degrees(width), "deg"),
@@ -154,7 +159,7 @@ _READ = (_width, SteadyTurns.rate_span, SteadyTurns.slope)
 
 
 def _status(flights: Flights, steps: int) -> str | None:
-    if _measured(flights, steps, 0) is not None:
+    if _measured(_means(flights, steps)[:, 0]) is not None:
         return None
     return (
         f"ended early: fewer than {LEAST} of the {steps} turns were held, so there is no curve. The rudder has too "
@@ -164,6 +169,6 @@ def _status(flights: Flights, steps: int) -> str | None:
 
 def _curves(flights: Flights, steps: int, turns: SteadyTurns) -> dict[str, Any]:
     """The measured curve of one craft, if there is one, and the algebraic one."""
-    measured = _measured(flights, steps, 0)
+    measured = _measured(_means(flights, steps)[:, 0])
     found = {"steady turns": steady_curve(turns)}
     return found if measured is None else {"reverse spiral": steady_curve(measured), **found}

@@ -80,10 +80,10 @@ def slowest_level_speed(model: Model, fastest: float = 5.0) -> float | None:
     None if it cannot even at ``fastest`` times its own speed.
     """
     speeds = model.craft.speed * np.geomspace(0.3, fastest, 25)
-    able = [level_trim(model, float(speed)).holds for speed in speeds]
-    if not able[-1]:
+    # The fastest that it cannot carry its weight residual at, looked for from above.
+    first = next((i for i in reversed(range(len(speeds))) if not level_trim(model, float(speeds[i])).holds), -1)
+    if first == len(speeds) - 1:
         return None
-    first = len(able) - 1 - next((i for i, ok in enumerate(reversed(able)) if not ok), len(able))
     if first < 0:
         return float(speeds[0])
     low, high = float(speeds[first]), float(speeds[first + 1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PPoly
@@ -33,19 +34,27 @@ class SteadyTurns:
         Source     Folds where d(rudder)/d(curvature) changes sign, the first to either side of straight flight, from a
                    cubic through the points.
         """
-        spline = self._over(self.rudder)
+        spline = self._rudder
         at = spline.derivative().roots(extrapolate=False)
         left, right = at[at < 0.0], at[at > 0.0]
         return float(abs(spline(left.max()) - spline(right.min()))) if len(left) and len(right) else 0.0
 
     def slope(self) -> float:
         """d(rate)/d(rudder) at zero rate [1/s]; its sign is that of the rudder's effect on a stable craft."""
-        return float(self._over(self.rate).derivative()(0.0) / self._over(self.rudder).derivative()(0.0))
+        return float(self._rate.derivative()(0.0) / self._rudder.derivative()(0.0))
 
     def rate_span(self) -> float:
         """Difference of the turning rates [rad/s] that need no rudder: the height of the loop; 0 when stable."""
-        roots = self._over(self.rudder).roots(extrapolate=False)
-        return float(np.ptp(self._over(self.rate)(roots))) if len(roots) > 1 else 0.0
+        roots = self._rudder.roots(extrapolate=False)
+        return float(np.ptp(self._rate(roots))) if len(roots) > 1 else 0.0
+
+    @cached_property
+    def _rudder(self) -> PPoly:
+        return self._over(self.rudder)
+
+    @cached_property
+    def _rate(self) -> PPoly:
+        return self._over(self.rate)
 
     def _over(self, values: Array) -> PPoly:
         return CubicSpline(self.curvature, values)
