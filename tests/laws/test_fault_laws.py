@@ -146,7 +146,7 @@ def test_a_lost_fin_takes_its_share_of_the_control_and_of_the_load_at_rest(craft
     drift = [1.0, 0.1, 0.0, 0.0, 0.0, 0.0]
     missing = np.array(lost.captive_load(drift, [0.0] * 6, [0.0] * 4)) - whole.captive_load(drift, [0.0] * 6, [0.0] * 4)
     # One of four X fins, each at 45 deg to the drift: its share of the rudder is a quarter.
-    rudder = 0.5 * np.arctan(0.1 * np.sqrt(0.5))
+    rudder = 0.5 * 0.1 * np.sqrt(0.5) / np.hypot(1.0, 0.1)
     assert missing[1] == pytest.approx(craft.derivatives["Yuudr"] * rudder / 4.0, rel=1e-9)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from towtank.artefact import read_json, write_json
-from towtank.craft.craft import Craft, Fin, Mass, Profile, Propeller
+from towtank.craft.craft import Craft, Fin, Mass, Profile, Propeller, Strake
 from towtank.craft.hull import Ellipsoid, Myring, Offsets, Suboff
 from towtank.derive.files import document as derivatives_document
 from towtank.derive.files import from_document as derivatives_of
@@ -103,6 +103,7 @@ def _craft_document(craft: Craft) -> dict[str, Any]:
         "origin_from_nose": craft.origin_from_nose,
         "profile": {"kind": profile.kind, **asdict(profile)},  # type: ignore[call-overload]
         "fins": [asdict(fin) for fin in craft.fins],
+        "strakes": [asdict(strake) for strake in craft.strakes],
         "mass": asdict(craft.mass),
         "propeller": asdict(craft.propeller),
         "water": asdict(craft.water),
@@ -119,6 +120,7 @@ def _craft(document: Mapping[str, Any]) -> Craft:
     nested = {
         "profile": profile,
         "fins": tuple(Fin(**fin) for fin in plain["fins"]),
+        "strakes": tuple(Strake(**strake) for strake in plain.get("strakes", ())),
         "mass": Mass(**plain["mass"]),
         "propeller": Propeller(**plain["propeller"]),
         "water": Water(**plain["water"]),
