@@ -330,8 +330,8 @@ def test_errors_name_what_is_wrong_and_what_to_do(monkeypatch):
     for message, wrong in (
         ("ends by an event of psi", lambda: record_of(figure()[1:2], CLOCK)),
         ("whole ticks", lambda: record_of([Leg("odd", Orders(), 1.05)], CLOCK)),
-        ("20: piloted, rudder", lambda: Record(np.zeros((2, 3)), np.zeros(4, dtype=int), CLOCK)),
-        ("outside the 1 of orders", lambda: Record(np.zeros((1, 20)), np.array([0, 1]), CLOCK)),
+        ("24: piloted, rudder", lambda: Record(np.zeros((2, 3)), np.zeros(4, dtype=int), CLOCK)),
+        ("outside the 1 of orders", lambda: Record(np.zeros((1, 24)), np.array([0, 1]), CLOCK)),
         ("whole ticks|one tick", lambda: record_of([Leg("short", Orders(), 0.01)], Clock(0.1))),
         (r"\(N, 16\) and \(N, 3\)", lambda: jacobian(craft, np.zeros((2, 17)), np.zeros((2, 4)), 1.0)),
         ("not finite", lambda: jacobian(craft, np.zeros((1, 16)), np.zeros((1, 3)), np.nan)),

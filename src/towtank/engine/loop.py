@@ -16,7 +16,7 @@ from towtank.model.equations import right_hand_side_quaternion, total_load
 from towtank.model.kinematics import quaternion_matrix
 from towtank.pilot.guidance import across, along
 from towtank.pilot.law import Seen, Steering, steer
-from towtank.pilot.orders import ORDERS, Orders
+from towtank.pilot.orders import FIN_ORDERS, ORDERS, Orders
 
 KINEMATIC = 13
 """States before the fins."""
@@ -113,10 +113,17 @@ def observe(s: System, x: Vector, orders: Vector, ops: Ops) -> list[Scalar]:
 
 
 def command(s: System, seen: Vector, memory: Vector, orders: Vector, ops: Ops) -> Steering:
-    """What the pilot grants, from the channels ``seen`` (``observed`` or more), its ``memory`` (3) and ``orders``."""
+    """What the pilot grants, from the channels ``seen`` (``observed`` or more), its ``memory`` (3) and ``orders``.
+
+    Orders of single fins are added to the angles it asks for; they are no part of what it grants.
+    """
     named = dict(zip(channels(len(s.constants.fins.max_angle)), seen, strict=False))
     eyes = Seen(**{name: named[SEEN.get(name, name)] for name in Seen._fields})
-    return steer(s.pilot, s.tail, _orders(orders), eyes, memory, ops)
+    o = _orders(orders)
+    steering = steer(s.pilot, s.tail, o, eyes, memory, ops)
+    own = [getattr(o, name) for name in FIN_ORDERS]
+    own += [0.0] * (len(steering.fins) - len(own))
+    return steering._replace(fins=[fin + more for fin, more in zip(steering.fins, own, strict=False)])
 
 
 def dynamics(s: System, x: Vector, asked: Vector, ops: Ops) -> list[Scalar]:

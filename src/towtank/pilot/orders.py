@@ -19,6 +19,7 @@ class Orders:
     turning : 1 when a rate of turn is followed instead of a heading; ``steer`` must be set.   turn [rad/s].
     pitching : 1 when a pitch is followed instead of a depth; ``dive`` must be set.   pitch [rad].
     throttle : thrust as a multiple of the run's own; 0 when the propeller stops, below 0 astern.
+    fin1 ... fin4 [rad] : added to the angle asked of one fin, such as the angles of a record that is replayed.
     """
 
     piloted: float = 0.0
@@ -41,7 +42,13 @@ class Orders:
     pitching: float = 0.0
     pitch: float = 0.0
     throttle: float = 1.0
+    fin1: float = 0.0
+    fin2: float = 0.0
+    fin3: float = 0.0
+    fin4: float = 0.0
 
 
 ORDERS: tuple[str, ...] = tuple(field.name for field in fields(Orders))
 """Names of the orders, in the order in which they are packed."""
+FIN_ORDERS: tuple[str, ...] = tuple(name for name in ORDERS if name.startswith("fin"))
+"""Orders of single fins."""
