@@ -95,7 +95,7 @@ def drive_of(model: Model, log: SeaLog, *, speed: float | None = None, steps: in
 
 
 def nearest(time: Array, values: Array, at: Array, tick: float) -> Array:
-    """Of ``values`` (N,) at ``time`` (N,), the nearest to each of ``at`` (M,) within half a ``tick``; NaN without one."""
+    """Of ``values`` (N,) at ``time`` (N,), those nearest to ``at`` (M,) within half a ``tick``, else NaN."""
     held = np.isfinite(values)
     out = np.full(len(at), np.nan)
     if not held.any():
@@ -111,7 +111,7 @@ def nearest(time: Array, values: Array, at: Array, tick: float) -> Array:
 
 
 def bridged(time: Array, values: Array, at: Array, hold: float = LONGEST_HOLD) -> tuple[Array, Mask]:
-    """``values`` (N,) at ``at`` (M,) by straight lines, and whether the samples around are ``hold`` [s] apart or less."""
+    """``values`` (N,) at ``at`` (M,) by straight lines, and whether samples at most ``hold`` [s] apart are around."""
     held = np.isfinite(values)
     own, kept = time[held], values[held]
     if len(own) < 2:
