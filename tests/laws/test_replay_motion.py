@@ -125,7 +125,7 @@ def test_what_is_not_measured_is_told_by_the_model_or_said_to_be_zero(model):
     assert (course.current.flow == 0.0).all()
     assert any(word.startswith("v: not measured") for word in last.begin.words)
     assert any("x, y, phi: not measured" in word for word in last.begin.words)
-    # A steady turn has no sway acceleration. The heel that was not measured turns the craft's weight residual into sway:
+    # A steady turn has no sway acceleration. The heel, not measured, turns the weight residual into sway:
     # a tenth of it.
     assert last.begin.state[7] == pytest.approx(log["slip"][last.first], rel=0.15)
 

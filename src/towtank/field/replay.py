@@ -156,7 +156,7 @@ def _part(
         place = done - part.first
         block[:, place : place + ticks + 1] = rows
         gone |= flights.ended != Ended.DONE
-        starts, done = flights.state, done + ticks
+        starts, done = _handed_on(starts, flights.state, gone), done + ticks
         if gone.all():
             break
     return block, gone.astype(np.int64)
@@ -191,6 +191,14 @@ def _starts(course: Course, part: Part, scatter: Scatter | None, number: int) ->
             f"current_{word}": begin.current[i] + flow[:, i] for i, word in enumerate(("north", "east", "down"))
         }
     return np.stack([one(state) for state in states]), columns
+
+
+def _handed_on(starts: Array, ends: Array, gone: NDArray[np.bool_]) -> Array:
+    """Where the next call begins: where the last one ended, its quaternions of the length 1; lost craft stay behind."""
+    stay = gone | ~np.isfinite(ends).all(axis=1)
+    out = np.where(stay.reshape(-1, 1), starts, ends)
+    out[:, 3:7] /= np.linalg.norm(out[:, 3:7], axis=1, keepdims=True)
+    return np.asarray(out)
 
 
 def _pieces(course: Course, part: Part, width: int) -> list[tuple[list[Leg], int]]:
