@@ -9,6 +9,7 @@ import typer
 from towtank.cli.assess import assess
 from towtank.cli.check import check
 from towtank.cli.check_coefficients import check_coefficients
+from towtank.cli.compare import compare
 from towtank.cli.derive import derive
 from towtank.cli.design import design
 from towtank.cli.doctor import doctor
@@ -73,6 +74,7 @@ for _command in (
     mc,
     faults,
     assess,
+    compare,
     sweep,
     design,
     report,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from towtank.tank.tank import Tank
     from towtank.trials.trajectory import Trajectory
 
-BESIDE = ("grid", "design", "cruise")
+BESIDE = ("grid", "design", "cruise", "compare")
 """Files that the report shows and that no stage of the chain writes."""
 STAGES = ("craft", "plan", "tow", "derive", "trials", "mc", "faults", "verdict", "report")
 

@@ -17,6 +17,8 @@ SHARE = 0.25
 """Longest lag as a share of the record."""
 HIGH = 0.9
 """Correlation from which a lag is taken for one of the clocks, and not for a difference of the motions."""
+GAIN = 0.5
+"""Share to which a lag must bring down what is left of the correlation, 1 less it, to be taken for one of the clocks."""
 LEAST = 20
 """Samples that record and model must have in common at a lag."""
 
@@ -40,7 +42,8 @@ class Lag:
 def lag_of(record: Mapping[str, Array], model: Mapping[str, Array], tick: float, *, align: bool | None = None) -> Lag:
     """The lag of ``record`` behind ``model``, channels (N,) on one clock of ``tick`` [s], NaN where there is nothing.
 
-    align : True takes it out, False leaves it; None takes out a lag above half a tick whose correlation is ``HIGH``.
+    align : True takes it out, False leaves it; None takes out a lag above half a tick whose correlation is ``HIGH`` and
+    without which it is plainly lower (``GAIN``).
 
     Source     Normalised cross-correlation over what both hold at each lag, its peak refined by a parabola through
                three points.
@@ -56,8 +59,8 @@ def lag_of(record: Mapping[str, Array], model: Mapping[str, Array], tick: float,
             break
     if not best.channel:
         return best
-    wanted = align if align is not None else abs(best.seconds) > 0.5 * tick and best.peak >= HIGH
-    applied = bool(wanted)
+    plain = best.peak >= HIGH and 1.0 - best.peak <= GAIN * (1.0 - best.before)
+    applied = bool(align if align is not None else abs(best.seconds) > 0.5 * tick and plain)
     said = "taken out of the comparison" if applied else "left as it is"
     words = (
         f"time alignment: the record is {abs(best.seconds):.3g} s {'behind' if best.seconds >= 0 else 'ahead of'} the "

@@ -17,6 +17,7 @@ from towtank.provenance import VERSION
 from towtank.report import (
     of_craft,
     of_design,
+    of_field,
     of_fit,
     of_grid,
     of_jammed,
@@ -42,6 +43,7 @@ SECTIONS: tuple[Callable[[Study, Sketchbook], Section], ...] = (
     of_trials.trials,
     of_montecarlo.uncertainty,
     of_jammed.faults,
+    of_field.records,
     of_verdict.verdict,
     of_design.design,
     of_verdict.validation,
@@ -64,7 +66,8 @@ def report(path: str | Path, *things: Any, title: str = "") -> Path:
     ----------
     path : file to be written.
     things : Craft, Plan, Run, GridStudy, Derivatives, FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins,
-        Verdict, DesignStudy, Cruise, or sequences of them, in any order. A stage that is not given is named on it.
+        Comparison, Verdict, DesignStudy, Cruise, or sequences of them, in any order. A stage that is not given is
+        named on it.
     title : of the page; the craft's own when left out.
 
     Returns

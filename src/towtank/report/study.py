@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from towtank.derive.study import FrequencyStudy
     from towtank.design.cruise import Cruise
     from towtank.design.study import DesignStudy
+    from towtank.field.comparing.result import Comparison
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
     from towtank.trials.jammed import JammedFins
@@ -36,12 +37,15 @@ STAGES = {
     "trials": "Pass trajectories, or run `towtank trial`.",
     "mc": "Pass the MonteCarlo, or run `towtank mc`.",
     "faults": "Pass the JammedFins, or run `towtank faults`.",
+    "compare": "Pass the Comparison, or run `towtank compare` with a record.",
     "verdict": "Pass the Verdict, or run `towtank assess`.",
     "design": "Pass the DesignStudy, or run `towtank design`.",
     "grid": "Pass the GridStudy, or run `towtank grid`.",
     "validation": "Run `make validate`, which compares the fast tank with published tests.",
 }
 """Stage -> what to do when it has left nothing."""
+SEVERAL = ("runs", "trajectories", "comparisons")
+"""Parts of a study of which there may be several."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,7 @@ class Study:
     trajectories: tuple[Trajectory, ...] = ()
     mc: MonteCarlo | None = None
     jammed: JammedFins | None = None
+    comparisons: tuple[Comparison, ...] = ()
     verdict: Verdict | None = None
     design: DesignStudy | None = None
     cruise: Cruise | None = None
@@ -78,6 +83,7 @@ class Study:
         found = [run.level for run in self.runs]
         found += [self.derivatives.level] if self.derivatives else []
         found += [trial.level for trial in self.trajectories]
+        found += [one.record_level for one in self.comparisons]
         found += [self.verdict.level] if self.verdict else []
         return tuple(dict.fromkeys(found))
 
@@ -100,10 +106,10 @@ def gather(things: Iterable[Any]) -> Study:
     InputError
         Something that is none of these, or two of what there can be one of.
     """
-    held: dict[str, Any] = {"runs": [], "trajectories": []}
+    held: dict[str, Any] = {name: [] for name in SEVERAL}
     for thing in _flat(things):
         name = _part(thing)
-        if name in ("runs", "trajectories"):
+        if name in SEVERAL:
             held[name].append(thing)
         elif name in held and held[name] is not thing:
             raise InputError(
@@ -111,7 +117,7 @@ def gather(things: Iterable[Any]) -> Study:
             )
         else:
             held[name] = thing
-    study = Study(**{**held, "runs": tuple(held["runs"]), "trajectories": tuple(held["trajectories"])})
+    study = Study(**{**held, **{name: tuple(held[name]) for name in SEVERAL}})
     return completed(study)
 
 
@@ -173,6 +179,7 @@ def _part(thing: Any) -> str:
     from towtank.derive.study import FrequencyStudy
     from towtank.design.cruise import Cruise
     from towtank.design.study import DesignStudy
+    from towtank.field.comparing.result import Comparison
     from towtank.model.equations import Model
     from towtank.montecarlo.result import MonteCarlo
     from towtank.trials.jammed import JammedFins
@@ -180,14 +187,15 @@ def _part(thing: Any) -> str:
 
     late: tuple[tuple[type, str], ...] = (
         (FrequencyStudy, "frequency"), (Model, "model"), (MonteCarlo, "mc"), (JammedFins, "jammed"),
-        (Verdict, "verdict"), (DesignStudy, "design"), (Cruise, "cruise"),
+        (Verdict, "verdict"), (DesignStudy, "design"), (Cruise, "cruise"), (Comparison, "comparisons"),
     )  # fmt: skip
     for of, name in late:
         if isinstance(thing, of):
             return name
     raise InputError(
         f"report: a {type(thing).__name__} cannot be shown. Give Craft, Plan, Run, GridStudy, Derivatives, "
-        "FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins, Verdict, DesignStudy, Cruise, or sequences of them."
+        "FrequencyStudy, Model, Trajectory, MonteCarlo, JammedFins, Comparison, Verdict, DesignStudy, Cruise, or "
+        "sequences of them."
     )
 
 
@@ -247,6 +255,7 @@ def _results(root: Path, attempt: Callable[..., Any]) -> dict[str, Any]:
     from towtank.design.cruise import read_cruise
     from towtank.design.files import read_design
     from towtank.experiments.files import read_optimal
+    from towtank.field.comparing.files import read_comparisons
     from towtank.grid.files import read_grid
     from towtank.montecarlo.files import read_mc
     from towtank.trials.jammed_files import read_jammed
@@ -263,6 +272,7 @@ def _results(root: Path, attempt: Callable[..., Any]) -> dict[str, Any]:
         ("grid", "grid", "grid.json", read_grid),
     )
     found = {part: attempt(stage, root / name, partial(read, root / name)) for part, stage, name, read in known}
+    found["comparisons"] = attempt("compare", root / "compare.json", partial(read_comparisons, root), ())
     optimal = root / "optimal.json"
     return found | {"optimal": attempt("plan", optimal, partial(read_optimal, optimal), {})}
 

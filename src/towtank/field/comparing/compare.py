@@ -222,7 +222,7 @@ def _channel(name: str, sides: _Sides, course: Course) -> ChannelScore:
     return ChannelScore(
         name, unit, int(good.sum()), bias, rms, rms / spread if spread > 0.0 else np.nan, float(expected),
         _share(record, low, high, good), _share(record, wide_low, wide_high, good), _growth(off, sides, course),
-        tuple(_rms(off[a:b]) for a, b in sides.spans), bool(sides.std[name] or sides.bias[name]),
+        tuple(_rms(off[a:b]) for a, b in sides.spans), float(np.hypot(sides.std[name], sides.bias[name])),
     )  # fmt: skip
 
 

@@ -149,7 +149,7 @@ def _each(of: Callable[[Motion, Marks], float]) -> Reader:
 
 def _spectral() -> list[Metric]:
     out = []
-    for channel in ("r", "q", "p"):
+    for channel in ("r", "q"):
         for low, high in BANDS:
             formula = f"root of the power spectral density of {channel} over {low:g} to {high:g} Hz"
 
@@ -194,8 +194,8 @@ METRICS: tuple[Metric, ...] = (
         _each(lambda m, marks: _steps(m, marks, "z", 0)), "closed",
     ),
     Metric(
-        "depth_settling", "z", "s", "mean time until the depth stays within 5 % of a step, or 0.1 m", "definition", ("z",),
-        _each(lambda m, marks: _steps(m, marks, "z", 1)), "closed",
+        "depth_settling", "z", "s", "mean time until the depth stays within 5 % of a step, or 0.1 m", "definition",
+        ("z",), _each(lambda m, marks: _steps(m, marks, "z", 1)), "closed",
     ),
     Metric(
         "fin_rms", "delta", "rad", "root of the mean square fin angle", "definition", ("delta1",), _each(_fin_rms),

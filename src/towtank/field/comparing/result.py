@@ -75,7 +75,7 @@ class ChannelScore:
     bias : mean of record less model, as a ``Score`` whose record is that mean and whose model is 0.   rms, nrms.
     expected : rms that the drawn craft have about the best estimate, with sensor noise.
     inside, inside_with_noise : shares within the band.   growth : rms at ``GROWTH`` [s] after a begin, NaN beyond.
-    parts : rms of each part.   noise : whether the record states any of the channel.
+    parts : rms of each part.   noise : standard deviation of noise and bias that the record states, 0 for none.
     """
 
     channel: str
@@ -89,7 +89,7 @@ class ChannelScore:
     inside_with_noise: float
     growth: tuple[float, ...]
     parts: tuple[float, ...]
-    noise: bool
+    noise: float
 
 
 @dataclass(frozen=True)
