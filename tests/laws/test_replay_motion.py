@@ -6,57 +6,26 @@ import numpy as np
 import pytest
 
 import towtank as tt
+from sea_records import CLOSED, CURRENT, FINS, OPEN, TICK, swum
 from towtank.craft.library import read_craft
-from towtank.engine.plan import Clock, Leg, Log
+from towtank.engine.plan import Leg, Log
 from towtank.engine.run import Ensemble, fly
-from towtank.engine.start import at
 from towtank.errors import InputError
 from towtank.field.begin import given
 from towtank.field.course import course_of
-from towtank.field.log import MEASURED, SeaLog
+from towtank.field.log import SeaLog
 from towtank.field.replay import Scatter, flown, replay
 from towtank.model.equations import Model
 from towtank.pilot.design import design_pilot
 from towtank.plan.standard import standard_plan
 from towtank.tank.campaign import tow
 from towtank.tank.fast.tank import FastTank
-from towtank.trials.start import setting
-
-TICK = 0.1
-FINS = ("delta1", "delta2", "delta3", "delta4")
-CURRENT = np.array([0.11, -0.07, 0.0])
 
 
 @pytest.fixture(scope="module")
 def model():
     craft = read_craft("hokie")
     return Model(craft, tt.derive(tow(standard_plan(craft), FastTank(members=1))))
-
-
-def swum(model, legs, pilot=None, current=CURRENT, ticks=None, steps=2, **orders):
-    """A record without noise of ``legs`` of (orders, ticks), every channel at every tick."""
-    s = setting(model, 1.0, pilot, piloted=pilot is not None)
-    state = s.state.copy()
-    state[6:9] += current  # heading north: the craft at rest in its water
-    flights = fly(
-        model, at(state, s.memory), [Leg(f"{i}", s.orders(**o), n * TICK) for i, (o, n) in enumerate(legs)],
-        thrust=s.thrust, pilot=pilot, current=tuple(current), clock=Clock(TICK, steps), log=Log(),
-    )  # fmt: skip
-    names = (*MEASURED, *FINS, "rudder", "elevator", "aileron")
-    channels = {name: flights.series(name)[0] for name in names}
-    for order, channel in (("heading", "heading_order"), ("depth", "depth_order"), ("turn", "turn_order")):
-        if any(order in o for o, _ in legs):
-            rows = np.concatenate([np.full(n, float(o[order]) if order in o else np.nan) for o, n in legs])
-            channels[channel] = np.append(rows, rows[-1])
-    channels["throttle"] = np.ones(len(flights.time))
-    return SeaLog("swim", "hokie", flights.time, channels, synthetic=True), state[:12]
-
-
-OPEN = [({"rudder": a}, n) for a, n in ((0.0, 40), (0.2, 80), (-0.2, 120), (0.1, 60))]
-CLOSED = [
-    ({"steer": 1.0, "heading": 0.0, "dive": 1.0, "depth": 0.0}, 50),
-    ({"steer": 1.0, "heading": 0.5, "dive": 1.0, "depth": 2.0}, 250),
-]
 
 
 def test_measured_fins_replay_the_motion_in_a_current(model):

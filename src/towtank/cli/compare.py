@@ -129,7 +129,7 @@ def _compared(
     fins = log.fins == n or log.has("rudder", "elevator")
     if closed is None:
         closed = word is not None or not fins
-        chain.reply.log(
+        reply.log(
             f"{'closed' if closed else 'open'} loop: {'a pilot is named' if word else 'by what the record holds'}"
         )
     if word is not None and not closed:

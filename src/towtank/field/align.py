@@ -18,7 +18,7 @@ SHARE = 0.25
 HIGH = 0.9
 """Correlation from which a lag is taken for one of the clocks, and not for a difference of the motions."""
 GAIN = 0.5
-"""Share to which a lag must bring down what is left of the correlation, 1 less it, to be taken for one of the clocks."""
+"""Share to which a lag must bring down what the correlation lacks to 1, to be taken for one of the clocks."""
 LEAST = 20
 """Samples that record and model must have in common at a lag."""
 

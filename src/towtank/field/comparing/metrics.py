@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -65,12 +66,12 @@ def marks_of(record: Motion, spans: Sequence[Span], tick: float) -> Marks:
     turns: tuple[Span, ...] = ()
     if "r" in record:
         found = [(max(a, x), min(b, y)) for a, b in signals.steady_turns(record["r"], tick) for x, y in spans]
-        turns = tuple((a, b) for a, b in found if (b - a) * tick >= signals.WINDOW)
+        turns = tuple((a, b) for a, b in found if (b - a) * tick >= 0.5 * signals.WINDOW)
     swings: list[Span] = []
     ordered = "heading_order" in record and np.isfinite(record["heading_order"]).any()
     if "rudder" in record and not ordered:
         at = signals.reversals(record["rudder"], tick)
-        swings = [(a, b) for a, b in zip(at, [*at[1:], len(record["rudder"])], strict=True)]
+        swings = list(pairwise([*at, len(record["rudder"])]))
     within = [(a, b) for a, b in swings for x, y in spans if x <= a and b <= y]
     steps = {
         name: tuple(signals.steps_of(record[name], least, tick)) if name in record else ()

@@ -68,7 +68,10 @@ def filled(values: Array, tick: float, hold: float = 1.0) -> Array:
 
 
 def steady_turns(r: Array, tick: float) -> list[Span]:
-    """Spans of a yaw rate (N,) [rad/s] that stands: its spread over ``WINDOW`` is below ``STEADY`` of its mean."""
+    """Spans of a yaw rate (N,) [rad/s] that stands: its spread over ``WINDOW`` is below ``STEADY`` of its mean.
+
+    A span is ``SMOOTH`` shorter on both sides than the window that shows it.
+    """
     wide, narrow = max(2, round(WINDOW / tick)), max(1, round(SMOOTH / tick))
     values = filled(r, tick)
     if len(values) < wide + narrow:
@@ -81,8 +84,9 @@ def steady_turns(r: Array, tick: float) -> list[Span]:
     out = np.zeros(len(values), dtype=bool)
     half = wide // 2
     for a, b in runs(steady):
-        out[max(0, a - half + 1) : b + half] = True
-    return [span for span in runs(out & np.isfinite(values)) if span[1] - span[0] >= wide]
+        # What the averages have drawn in from before and after is left out.
+        out[max(0, a - half + narrow) : b + half - narrow] = True
+    return runs(out & np.isfinite(values))
 
 
 def _mean(values: Array, width: int) -> Array:
