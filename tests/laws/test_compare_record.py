@@ -125,10 +125,11 @@ def test_another_craft_stands_out_of_its_numbers(model, twin):
 
 
 def test_a_turn_and_its_radius_are_those_of_the_record(model):
-    log, state = swum(model, [({"rudder": 0.0}, 30), ({"rudder": 0.25}, 900)])
+    log, state = swum(model, [({"rudder": 0.0}, 30), ({"rudder": 0.25}, 2400)])
     it = compare(model, log, start=given(state, CURRENT), samples=10, speed=1.0)
     found = {one.name: one for one in it.metrics}
     steady = np.abs(log["r"][-100:]).mean()
+    # The turn still slows down for a while after its rate has come to stand within 3 % over ten seconds.
     assert found["turn_rate"].record == pytest.approx(steady, rel=0.1)
     assert found["turn_rate"].model == pytest.approx(found["turn_rate"].record, rel=1e-3)
     assert found["turn_radius"].record == pytest.approx(log["ahead"][-100:].mean() / steady, rel=0.1)

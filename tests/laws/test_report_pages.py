@@ -100,8 +100,8 @@ def parsed(whole) -> Page:
 def test_every_tag_is_closed_and_every_section_is_there_in_order(parsed):
     assert parsed.stack == []
     assert parsed.sections == [
-        "summary", "craft", "tests", "grid", "forces", "model", "fit", "trials", "mc", "faults", "verdict", "design",
-        "validation", "sensitivity", "limits", "constants", "provenance", "runs",
+        "summary", "craft", "tests", "grid", "forces", "model", "fit", "trials", "mc", "faults", "compare", "verdict",
+        "design", "validation", "sensitivity", "limits", "constants", "provenance", "runs",
     ]  # fmt: skip
     assert len(parsed.sections) == len(SECTIONS)
 

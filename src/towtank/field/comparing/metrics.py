@@ -85,14 +85,17 @@ def _mean(values: Sequence[float]) -> float:
     return float(np.mean(held)) if held else np.nan
 
 
+def _in_turns(values: Array, marks: Marks) -> float:
+    return _average(np.concatenate([values[a:b] for a, b in marks.turns])) if marks.turns else np.nan
+
+
 def _turn_rate(m: Motion, marks: Marks) -> float:
-    return _mean([_average(np.abs(m["r"][a:b])) for a, b in marks.turns])
+    return _in_turns(np.abs(m["r"]), marks)
 
 
 def _turn_radius(m: Motion, marks: Marks) -> float:
     speed = m["ahead"] if "ahead" in m else m["u"] if "u" in m else m["speed"]
-    found = [(_average(speed[a:b]), _average(np.abs(m["r"][a:b]))) for a, b in marks.turns]
-    return _mean([U / r for U, r in found if r > 0.0])
+    return _in_turns(speed, marks) / _in_turns(np.abs(m["r"]), marks)
 
 
 def _average(values: Array) -> float:

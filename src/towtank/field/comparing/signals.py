@@ -18,7 +18,7 @@ TURNING = np.radians(0.5)
 """Least yaw rate [rad/s] of a turn."""
 WINDOW = 10.0
 """Shortest steady turn [s]."""
-STEADY = 0.1
+STEADY = 0.03
 """Largest standard deviation of the yaw rate in a steady turn, as a share of its mean."""
 SMOOTH = 2.0
 """Time [s] over which the yaw rate is averaged before a turn is looked for."""
