@@ -29,8 +29,8 @@ WIDTH = 100
 class Reply:
     """The answer of one command, filled while it works.
 
-    files : noun -> path.   summary : plain content for the JSON document.   kept : what stays when stopped.   resume : what the same command does
-    then.
+    files : noun -> path.   summary : plain content for the JSON document.   kept : what stays when stopped.
+    resume : what the same command then does.
     """
 
     command: str
