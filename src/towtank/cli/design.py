@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -34,6 +35,10 @@ Reach = Annotated[
     str | None,
     typer.Option(metavar="LENGTH", help="Nothing further from the axis than this.", show_default=False),
 ]
+Requirements = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Requirements (TOML) to meet, as of towtank assess.", show_default=False),
+]
 Range = Annotated[bool, typer.Option("--range", help="Only the speed and trim of least energy per metre.")]
 Hotel = Annotated[
     str | None,
@@ -60,6 +65,7 @@ def design(
     vary: Vary = None,
     target: Target = "95 %",
     reach: Reach = None,
+    requirements: Requirements = None,
     range_: Range = False,
     hotel: Hotel = None,
     current: Current = "0 m/s",
@@ -82,6 +88,8 @@ def design(
 
     Example: towtank design hokie --vary fin_span=1:2 --vary "strake_height=0:25 cm" --reach "60 cm"
 
+    Example: towtank design hokie --requirements mine.toml
+
     Example: towtank design hokie --range --hotel "40 W" --current "0.2 m/s"
     """
     with answering("design", json, debug) as reply:
@@ -103,24 +111,39 @@ def design(
         if cores() > 1 and (workers or 2) > 1:
             prepare("towtank.design.point")
         _publish(
-            chain, _study(chain, vary or [], target, reach, power, share, members, evaluations, workers or cores())
+            chain,
+            _study(
+                chain, vary or [], target, reach, requirements, power, share, members, evaluations, workers or cores()
+            ),
         )
 
 
 def _study(
-    chain: Chain, vary: list[str], target: str, reach: str | None, hotel: float, efficiency: float | None, members: int,
-    evaluations: int, workers: int,
+    chain: Chain, vary: list[str], target: str, reach: str | None, requirements: Path | None, hotel: float,
+    efficiency: float | None, members: int, evaluations: int, workers: int,
 ) -> DesignStudy:  # fmt: skip
     from towtank.design.goal import reach_goal, stability_goals
+    from towtank.design.needs import goals_of, needed
     from towtank.design.point import Question
     from towtank.design.run import LEDGER, axes_of, run_design
     from towtank.quantity import si
+    from towtank.sweep.point import model_of
+    from towtank.tank.fast.tank import FastTank
+    from towtank.verdict.needs import read_requirements
 
     wanted = si(target, "", "--target")
     goals: tuple[Goal, ...] = stability_goals(chain.craft, wanted)
     if reach is not None:
         goals = (*goals, reach_goal(si(reach, "m", "--reach")))
-    question = Question(chain.craft, wanted, members, efficiency, hotel)
+    needs = read_requirements(requirements) if requirements is not None else ()
+    if needs:
+        model = model_of(chain.craft, FastTank(members=members))
+        asked = goals_of(needs, needed(model, needs), chain.craft, wanted)
+        told = {goal.column for goal in asked}
+        goals = (*asked, *(goal for goal in goals if goal.column not in told))
+        if shares := [need.name for need in needs if need.share is not None]:
+            chain.reply.log(f"for the best estimate only, not for a share of drawn craft: {', '.join(shares)}")
+    question = Question(chain.craft, wanted, members, efficiency, hotel, needs)
     axes = axes_of(chain.craft, vary)
     chain.prepare()
     chain.reply.kept = f"Finished variants are kept in {chain.study.root / LEDGER}."

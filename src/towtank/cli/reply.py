@@ -24,14 +24,13 @@ DONE, BAD_INPUT, FAILED, STOPPED = 0, 2, 3, 130
 
 WIDTH = 100
 
-RESUME = " The same command resumes."
-
 
 @dataclass
 class Reply:
     """The answer of one command, filled while it works.
 
     files : noun -> path.   summary : plain content for the JSON document.   kept : what stays when stopped.
+    resume : what the same command then does.
     """
 
     command: str
@@ -40,6 +39,7 @@ class Reply:
     exit_code: int = DONE
     error: str = ""
     kept: str = "Files already written are whole."
+    resume: str = " The same command resumes."
     files: dict[str, str] = field(default_factory=dict)
     summary: dict[str, Any] = field(default_factory=dict)
     progress: Progress = field(default_factory=Silent)
@@ -120,9 +120,9 @@ def answering(command: str, as_json: bool = False, debug: bool = False) -> Itera
             yield reply
     except TowtankError as error:
         stopped = isinstance(error.__context__, KeyboardInterrupt)
-        reply.fail(STOPPED if stopped else error.exit_code, f"{error}{RESUME if stopped else ''}")
+        reply.fail(STOPPED if stopped else error.exit_code, f"{error}{reply.resume if stopped else ''}")
     except KeyboardInterrupt:
-        reply.fail(STOPPED, f"stopped. {reply.kept}{RESUME}")
+        reply.fail(STOPPED, f"stopped. {reply.kept}{reply.resume}")
     except BrokenPipeError:
         raise  # the reader of stdout went away (towtank ... | head); click ends quietly
     except Exception as error:  # the last gate before the user: every other kind is a fault of the program

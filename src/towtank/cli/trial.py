@@ -155,9 +155,11 @@ def _chosen(word: str, given: Mapping[str, Any], pilot: str | None) -> Callable[
     if word.endswith(".toml"):
         if given:
             raise InputError(f"{word} says all of its trial; it takes no --{next(iter(given)).replace('_', '-')}.")
-        own = {"path": Path(word)}
+        from towtank.trials.schema import read_trial
+
+        asked = {"speed": read_trial(word).speed} if pilot else {}
         return lambda model: towtank.trial_from_file(
-            model, **own, **flown_by(towtank.trial_from_file, pilot, model, own)
+            model, Path(word), **flown_by(towtank.trial_from_file, pilot, model, asked)
         )
     if word not in list(Kind):
         raise InputError(f"{word!r} is no trial. Those are: {', '.join(Kind)}; or a file that ends in .toml.")

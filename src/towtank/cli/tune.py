@@ -57,6 +57,7 @@ def tune(
         asked = speeds_of(speeds) or (chain.craft.speed, FASTER * chain.craft.speed)
         model = afloat(chain.model(), asked, reply)
         start = seeing(pilot_of(pilot or "cascade", model, asked[0]), noisy)
+        reply.resume = " The same command begins the search again."
         words = tuple(word.strip() for word in steps.split(",") if word.strip())
         found = tune(
             model, start, speeds=asked, steps=words, drawn=drawn, seed=seed, rounds=rounds, threads=cores(),

@@ -9,6 +9,7 @@ import numpy as np
 
 from towtank.craft.craft import Craft
 from towtank.craft.hydrostatics import check, hydrostatics
+from towtank.design.needs import needed
 from towtank.design.power import drive_of, electrical_power
 from towtank.errors import InputError
 from towtank.frames import Array
@@ -22,6 +23,7 @@ from towtank.sweep.point import Numbers, evaluate, model_of
 from towtank.sweep.vary import KINDS, vary
 from towtank.tank.fast.tank import FastTank
 from towtank.verdict.criteria import horizontal_matrix, index, samples, vertical_matrix
+from towtank.verdict.needs import Need
 
 TRIALS = ("turning_circle", "zigzag")
 """Trials of the points that the study names: the craft as given, and its candidates."""
@@ -38,6 +40,7 @@ class Question:
 
     target : probability of stability for the smooth columns.   members : of the tank's ensemble.
     efficiency : overall, None for what is known or assumed.   hotel : power of everything but propulsion [W].
+    needs : requirements whose numbers are wanted.
     """
 
     craft: Craft
@@ -45,6 +48,7 @@ class Question:
     members: int = 48
     efficiency: float | None = None
     hotel: float = 0.0
+    needs: tuple[Need, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what gives no probability.
@@ -89,7 +93,8 @@ def work(question: Question, changes: Changes) -> dict[str, Any]:
     """
     craft = question.craft_at(changes)
     model = model_of(craft, question.tank)
-    return _content({**_stability(model, question.target), **_costs(model, question), **_shape(craft)})
+    numbers = {**_stability(model, question.target), **_costs(model, question), **_shape(craft)}
+    return _content({**numbers, **needed(model, question.needs)})
 
 
 def work_with_trials(question: Question, changes: Changes) -> dict[str, Any]:

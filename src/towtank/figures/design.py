@@ -67,7 +67,7 @@ def design_contours(study: DesignStudy, column: str = "P_stable_h", ax: Axes | N
     base = study.base.values["drag"]
     if there.sum() > 3 and min(Z.shape) > 1:
         levels = LEVELS if column.startswith("P_") else 10
-        filled = ax.contourf(X, Y, np.ma.masked_invalid(Z), levels=levels, cmap="Blues", alpha=0.4)
+        filled = ax.contourf(X, Y, np.ma.masked_invalid(Z), levels=levels, cmap="Blues", alpha=0.25)
         edges = ax.contour(X, Y, np.ma.masked_invalid(Z), levels=filled.levels, colors=FIT, linewidths=0.5)
         ax.clabel(edges, fontsize=6.5, fmt="%.3g", colors=INK)
         if column.startswith("P_") and float(np.nanmin(Z)) < study.target < float(np.nanmax(Z)):

@@ -16,6 +16,10 @@ QUANTITIES = {"track": ("off_track", "rms off the track [m]", 0), "depth": ("dep
 """Word -> values, label, place among those of the sound craft."""
 
 
+DECADE = 10.0
+"""Ratio of the largest to the smallest value from which the axis is logarithmic."""
+
+
 def jammed(it: JammedFins, quantity: str = "track", ax: Axes | None = None) -> Axes:
     """Rms off the track or off the depth [m] over the angle of the jam [deg]; open where the mission is not completed.
 
@@ -32,7 +36,9 @@ def jammed(it: JammedFins, quantity: str = "track", ax: Axes | None = None) -> A
     ax.axhline(it.sound[place], color=INK, linewidth=0.9, linestyle="--", label="sound fins")
     ax.plot([], [], "o", color=FIT, markerfacecolor="white", markersize=4, label="not completed")
     frame(ax, "angle of the jammed fin [deg]", label, zero=False)
-    ax.set_yscale("log")
+    known = getattr(it, name)[np.isfinite(getattr(it, name))]
+    if known.size and known.max() > DECADE * known.min() > 0.0:
+        ax.set_yscale("log")
     head(ax, f"One fin jammed, {it.mission}", it.level, f"best estimate; {it.speed:g} m/s")
     legend(ax, ncol=2)
     return ax

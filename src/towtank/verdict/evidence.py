@@ -115,6 +115,24 @@ class Evidence:
         effect = None if moved is None else self.steps.effect(moved)
         return Numbers(unit, float(size(np.array(best))), values, effect, self.steps.share())
 
+    def best(self, need: Need) -> tuple[float, str] | None:
+        """The number of the best estimate that ``need`` is about, and its unit; None where it has none.
+
+        Raises
+        ------
+        InputError
+            A trial that is not known.
+        """
+        if need.criterion:
+            value, unit = float(self.measure(need.criterion)[0]), MEASURES[need.criterion].unit
+        else:
+            name = self.trial(need)
+            own = next((dict(t.indices) for t in self.trajectories if t.name == name), {})
+            if need.index not in own:
+                return None
+            value, unit = own[need.index]
+        return (abs(value) if need.magnitude else value), unit
+
     def flown(self, name: str) -> Readings:
         """Indices of the craft with one coefficient moved, in the trial ``name``.
 
@@ -136,9 +154,9 @@ class Evidence:
             No such trial, or several of the kind.
         """
         kinds = {t.name: t.kind for t in self.trajectories} | {n: t.kind for n, t in self.population.trials.items()}
-        wanted = _plain(need.trial)
-        found = [name for name, kind in kinds.items() if wanted in (_plain(name), _plain(kind))]
-        exact = [name for name in found if _plain(name) == wanted]
+        wanted = plain(need.trial)
+        found = [name for name, kind in kinds.items() if wanted in (plain(name), plain(kind))]
+        exact = [name for name in found if plain(name) == wanted]
         # The kind means the standard trial of it where others were flown beside.
         standard = [name for name in found if name in self.population.trials]
         for choice in (exact, standard, found):
@@ -148,7 +166,7 @@ class Evidence:
             raise InputError(
                 f"{need.where}.trial: {need.trial!r} may be {' or '.join(sorted(found))}. Write one of these names."
             )
-        if need.optional or wanted in [_plain(name) for name in (*OPEN_LOOP, *CLOSED_LOOP)]:
+        if need.optional or wanted in [plain(name) for name in (*OPEN_LOOP, *CLOSED_LOOP)]:
             return None
         raise InputError(
             f"{need.where}.trial: this craft has made no trial {need.trial!r}. {_near(need.trial, kinds)} "
@@ -181,7 +199,8 @@ def _same(one: float, other: float) -> bool:
     return bool(np.isclose(one, other, rtol=SAME, atol=1e-6, equal_nan=True))
 
 
-def _plain(name: str) -> str:
+def plain(name: str) -> str:
+    """A name as it is compared: small letters, digits, dots, and a hyphen for everything else."""
     return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-")
 
 
