@@ -227,3 +227,14 @@ def test_craft_of_an_ensemble_are_those_of_the_engine(model):
         clock=course.clock, log=Log(("r",)), ensemble=Ensemble(2, column),
     )  # fmt: skip
     np.testing.assert_allclose(many["r"][0], run.series("r")[0], atol=1e-7)
+
+
+def test_between_fixes_the_position_is_reckoned(model):
+    log, _ = swum(model, [({"rudder": 0.1}, 600), ({"rudder": -0.15}, 600)])
+    rare = np.isin(np.arange(len(log.time)), [0, 5, 10, 15, 20, 25, 30, 1170, 1175, 1180, 1185, 1190, 1195, 1200])
+    few = {n: np.where(rare | (n not in ("x", "y")), v, np.nan) for n, v in log.channels.items()}
+    course = course_of(model, replace(log, channels=few), horizon=20.0, speed=1.0)
+    for part in course.parts:
+        # Fixes two minutes apart; the trapezoid rule and the begin's parabola leave some centimetres.
+        np.testing.assert_allclose(part.begin.state[:2], [log["x"][part.first], log["y"][part.first]], atol=0.1)
+    assert any("reckoned from the nearest fixes" in word for word in course.words)

@@ -71,6 +71,10 @@ def beginning(drive: Drive, tick: int, current: Current) -> Beginning:
         if name in seen:
             state[i], std[i] = seen[name].value, seen[name].std
     absent = [name for name in STATE[:6] if name not in seen]
+    if current.track is not None and current.track_std is not None and {"x", "y"} & set(absent):
+        state[:2], std[:2] = current.track[tick], current.track_std[tick]
+        absent = [name for name in absent if name not in ("x", "y")]
+        words.append("x, y: reckoned from the nearest fixes")
     if absent:
         words.append(f"{', '.join(absent)}: not measured here, zero")
     _rates(state, std, seen, words)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,8 +123,15 @@ def course_of(
     delta = drive.delta if pilot is None else _fins_seen(model, log, drive)
     return Course(
         drive, drive.model, pilot, orders, delta, clock, every, memory, parts, current, horizon,
-        (current.words, *parts[0].begin.words, *words),
+        (current.words, *_said(parts), *words),
     )  # fmt: skip
+
+
+def _said(parts: Sequence[Part]) -> list[str]:
+    """What was assumed at the begins, each once, with the number of parts it is said of."""
+    counted = Counter(word for part in parts for word in part.begin.words)
+    n = len(parts)
+    return [f"{word} (at {count} of {n} begins)" if n > 1 else word for word, count in counted.items()]
 
 
 def _same_craft(model: Model, log: SeaLog) -> None:

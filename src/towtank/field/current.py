@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +28,17 @@ _THROTTLE = ORDERS.index("throttle")
 
 @dataclass(frozen=True)
 class Current:
-    """flow (3,) [m/s, NED], std (3,) its standard error, words : where it comes from, or why it is zero."""
+    """flow (3,) [m/s, NED], std (3,) its standard error, words : where it comes from, or why it is zero.
+
+    track (N + 1, 2) [m] : north and east on the ticks, between fixes too; None where there are none.   track_std
+    (N + 1,) : its standard error.
+    """
 
     flow: Array
     std: Array
     words: str
+    track: Array | None = None
+    track_std: Array | None = None
 
 
 def no_current(why: str) -> Current:
@@ -41,6 +47,34 @@ def no_current(why: str) -> Current:
 
 
 def mean_current(drive: Drive, log: SeaLog) -> Current:
+    """The mean current of a record, and its track between fixes.
+
+    The track is the way through the water and with the current, bent by straight lines in time to pass through the
+    fixes; without a speed log it is straight between them. Its error grows with the time from the nearest fix by the
+    scatter of the current over the record.
+
+    Source     As ``_mean``.
+    """
+    found = _mean(drive, log)
+    if not log.has("x", "y"):
+        return found
+    fixes = np.flatnonzero(np.isfinite(drive.seen["x"]) & np.isfinite(drive.seen["y"]))
+    if len(fixes) < 2:
+        return found
+    way = np.zeros((len(drive.time), 2))
+    if log.has("psi", "ahead"):
+        way = _way(drive, *_through(drive, log)[:2]) + (drive.time - drive.time[0])[:, None] * found.flow[:2]
+    seen = np.stack([drive.seen["x"], drive.seen["y"]], axis=1)
+    ticks = np.arange(len(drive.time))
+    bend = np.stack([np.interp(ticks, fixes, (seen - way)[fixes, i]) for i in range(2)], axis=1)
+    after = np.clip(np.searchsorted(fixes, ticks), 1, len(fixes) - 1)
+    apart = np.minimum(np.abs(ticks - fixes[after]), np.abs(ticks - fixes[after - 1])) * drive.clock.tick
+    scatter = float(np.linalg.norm(found.std)) * np.sqrt(GROUPS)
+    std = np.hypot(max(log.std.get("x", 0.0), log.std.get("y", 0.0)), scatter * apart)
+    return replace(found, track=way + bend, track_std=std)
+
+
+def _mean(drive: Drive, log: SeaLog) -> Current:
     """The mean horizontal current over the record; zero, and said so, where nothing tells it.
 
     Two ways, the one with the smaller error is taken: the distance made good less that through the water grows by the
@@ -117,13 +151,17 @@ def _through(drive: Drive, log: SeaLog) -> tuple[Array, Array, Mask]:
     return water, rotation(attitude), good
 
 
+def _way(drive: Drive, water: Array, J: Array) -> Array:
+    """Way (N, 2) [m] through the water to the north and east, by the trapezoid rule."""
+    ned = np.einsum("nij,nj->ni", J, water)[:, :2]
+    return np.concatenate([np.zeros((1, 2)), np.cumsum(0.5 * drive.clock.tick * (ned[1:] + ned[:-1]), axis=0)])
+
+
 def _by_position(drive: Drive, log: SeaLog, water: Array, J: Array, good: Mask) -> Current | None:
     """From x and y: their distance to the way through the water, part by part of the record without a hole."""
     if not log.has("x", "y"):
         return None
-    time, tick = drive.time, drive.clock.tick
-    ned = np.einsum("nij,nj->ni", J, water)[:, :2]
-    way = np.concatenate([np.zeros((1, 2)), np.cumsum(0.5 * tick * (ned[1:] + ned[:-1]), axis=0)])
+    time, way = drive.time, _way(drive, water, J)
     part = np.cumsum(np.concatenate([[0], ~(good[1:] & good[:-1])]))
     held = good & np.isfinite(drive.seen["x"]) & np.isfinite(drive.seen["y"])
     count = np.bincount(part[held], minlength=int(part.max()) + 1) if held.any() else np.zeros(1)
