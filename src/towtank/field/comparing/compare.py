@@ -132,10 +132,11 @@ def _record(course: Course, log: SeaLog, model: Model, names: Sequence[str]) -> 
         out["rudder"] = np.asarray(model.virtual([out[name] for name in fins])[0])
     elif log.has("rudder"):
         out["rudder"] = nearest(log.time, log["rudder"], time, tick)
-    for name in ("heading_order", "depth_order"):
-        values, _ = held(log, name, time)
-        if np.isfinite(values).any():
-            out[name] = np.append(values, values[-1])
+    for name, other in (("heading_order", "turn_order"), ("depth_order", "pitch_order")):
+        (values, since), (_, later) = held(log, name, time), held(log, other, time)
+        acts = np.isfinite(since) & ~(later > since)
+        if acts.any():
+            out[name] = np.append(np.where(acts, values, np.nan), np.nan)
     return out
 
 
@@ -331,7 +332,7 @@ def _uncertainties(
     if course.pilot is None:
         missing.append("errors of the fin angles in the record")
     else:
-        missing.append("differences between this pilot and the one aboard")
+        missing.append("differences between this pilot, which sees without noise, and the one aboard")
     if silent:
         missing.append(f"noise and bias of {', '.join(silent)}: not stated in the record")
     return tuple(included), tuple(missing)

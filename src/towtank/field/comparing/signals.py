@@ -136,18 +136,14 @@ def swing(psi: Array, r: Array, at: int, end: int, tick: float) -> tuple[float, 
 
 
 def steps_of(order: Array, least: float, tick: float) -> list[Step]:
-    """Jumps of an order (N,) by ``least`` or more that then holds for ``HOLD`` seconds."""
-    held = np.flatnonzero(np.isfinite(order))
-    if len(held) < 2:
-        return []
-    values = np.interp(np.arange(len(order)), held, order[held])
-    values[: held[0]] = order[held[0]]
-    changes = np.flatnonzero(np.abs(np.diff(values)) >= 0.2 * least) + 1
+    """Jumps of an order (N,) by ``least`` or more that then holds for ``HOLD`` seconds; NaN where it does not act."""
     out = []
-    for i, at in enumerate(changes.tolist()):
-        end = int(changes[i + 1]) if i + 1 < len(changes) else len(values)
-        if abs(values[at] - values[at - 1]) >= least and (end - at) * tick >= HOLD:
-            out.append(Step(at, end, float(values[at - 1]), float(values[at])))
+    for a, b in runs(np.isfinite(order)):
+        values = order[a:b]
+        edges = [*(np.flatnonzero(np.abs(np.diff(values)) >= 0.2 * least) + 1).tolist(), len(values)]
+        for at, end in pairwise(edges):
+            if abs(values[at] - values[at - 1]) >= least and (end - at) * tick >= HOLD:
+                out.append(Step(a + at, a + end, float(values[at - 1]), float(values[at])))
     return out
 
 
