@@ -135,6 +135,8 @@ def _compared(
     if word is not None and not closed:
         raise InputError("--pilot flies orders in closed loop, and --open replays the fins. Leave one of them out.")
     U = None if speed is None else si(speed, "m/s", "--speed")
+    if U is not None and not U > 0.0:
+        raise InputError(f"--speed {speed}: the thrust of the record belongs to a speed ahead. Give one above zero.")
     U = model.craft.speed if U is None and closed else U
     after = (None if closed else OPEN_HORIZON) if horizon is None else horizon or None
     pilot = pilot_of(word or "cascade", model, U) if closed and U is not None else None

@@ -30,6 +30,7 @@ class Beginning:
     current (3,) [m/s, NED].   state_std (12,), current_std (3,) : standard errors, 0 where none is known.
     through (3,) : True where u, v, w are known through the water, so that another current moves them over ground.
     words : what each comes from; what could not be told is said there, and is zero.
+    channels (12,) : that were measured as they stand, whose bias the state has; "" for what is told otherwise.
     """
 
     state: Array
@@ -38,6 +39,7 @@ class Beginning:
     current_std: Array
     through: tuple[bool, bool, bool] = (False, False, False)
     words: tuple[str, ...] = ()
+    channels: tuple[str, ...] = ("",) * 12
 
 
 def given(state: Array, current: Array | None = None) -> Beginning:
@@ -79,7 +81,10 @@ def beginning(drive: Drive, tick: int, current: Current) -> Beginning:
         words.append(f"{', '.join(absent)}: not measured here, zero")
     _rates(state, std, seen, words)
     through = _velocities(drive, tick, current, state, std, seen, words)
-    return Beginning(state, current.flow, std, current.std, through, tuple(words))
+    water = ("ahead", "slip", "plunge")
+    names = [name if name in seen else water[i - 6] if 6 <= i < 9 else "" for i, name in enumerate(STATE)]
+    own = tuple(name if name in seen else "" for name in names)
+    return Beginning(state, current.flow, std, current.std, through, tuple(words), own)
 
 
 def _local(drive: Drive, name: str, tick: int) -> Local | None:

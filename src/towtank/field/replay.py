@@ -34,13 +34,15 @@ class Scatter:
     """M craft that fly side by side, and where each begins.
 
     columns : parameter of the engine -> (M,).   current (M, 3) : standard normal numbers that multiply the standard
-    error of the current; state (M, 12) per part, drawn from ``seed``, likewise that of the state at its begin.
+    error of the current; those of the state at each begin are drawn from ``seed``.
+    bias : channel -> (M,), offset of its sensor all along: the craft begins that much lower than the record says; of
+    ``delta<i>``, that much lower stands fin i.
     """
 
     columns: Mapping[str, Array]
     current: Array
     seed: int = 0
-    state: bool = True
+    bias: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -136,6 +138,7 @@ def _part(
     """Channels (M, ticks + 1, C) of one part, and which craft were lost (M,)."""
     count = scatter.count if scatter else 1
     starts, columns = _starts(course, part, scatter, number)
+    offsets = _offsets(course, scatter)
     block = np.full((count, part.last - part.first + 1, len(kept)), np.nan)
     gone = np.zeros(count, dtype=bool)
     psi = list(kept).index("psi") if "psi" in kept else None
@@ -145,7 +148,7 @@ def _part(
         flights = fly(
             course.model, starts[0], legs, thrust=course.drive.thrust, pilot=course.pilot, clock=clock,
             current=part.begin.current.tolist(), log=Log(tuple(kept), course.every),
-            ensemble=Ensemble(count, columns, starts) if scatter else ONE,
+            ensemble=Ensemble(count, columns, starts, _shifted(legs, offsets)) if scatter else ONE,
         )  # fmt: skip
         rows = flights.log
         if psi is not None:
@@ -179,10 +182,10 @@ def _starts(course: Course, part: Part, scatter: Scatter | None, number: int) ->
     if scatter is None:
         return one(begin.state)[None], {}
     flow = scatter.current * begin.current_std
-    states = np.tile(begin.state, (scatter.count, 1))
-    if scatter.state:
-        random = np.random.default_rng((scatter.seed, number))
-        states = states + random.standard_normal(states.shape) * begin.state_std
+    random = np.random.default_rng((scatter.seed, number))
+    states = begin.state + random.standard_normal((scatter.count, 12)) * begin.state_std
+    for i, name in enumerate(begin.channels):
+        states[:, i] -= scatter.bias.get(name, 0.0)
     moved = flow @ rotation(begin.state[3:6])
     states[:, 6:9] += np.where(begin.through, moved, 0.0)
     columns = {**scatter.columns}
@@ -190,7 +193,27 @@ def _starts(course: Course, part: Part, scatter: Scatter | None, number: int) ->
         columns |= {
             f"current_{word}": begin.current[i] + flow[:, i] for i, word in enumerate(("north", "east", "down"))
         }
-    return np.stack([one(state) for state in states]), columns
+    starts = np.stack([one(state) for state in states])
+    for i, off in _offsets(course, scatter).items():
+        starts[:, 13 + i] += off
+    return starts, columns
+
+
+def _offsets(course: Course, scatter: Scatter | None) -> dict[int, Array]:
+    """Place of a fin -> offset (M,) [rad] of its angle from that of the record; in open loop only."""
+    if scatter is None or course.pilot is not None:
+        return {}
+    fins = range(len(course.model.craft.fins))
+    return {i: -scatter.bias[f"delta{i + 1}"] for i in fins if f"delta{i + 1}" in scatter.bias}
+
+
+def _shifted(legs: Sequence[Leg], offsets: Mapping[int, Array]) -> dict[str, Array]:
+    """Orders of the fins (M, legs) with their offsets. The lag of an actuator passes an offset as it is."""
+    names = {i: f"fin{i + 1}" for i in offsets}
+    return {
+        names[i]: off[:, None] + np.array([[getattr(leg.orders, names[i]) for leg in legs]])
+        for i, off in offsets.items()
+    }
 
 
 def _handed_on(starts: Array, ends: Array, gone: NDArray[np.bool_]) -> Array:

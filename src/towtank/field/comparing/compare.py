@@ -25,7 +25,7 @@ from towtank.field.comparing.result import (
 )
 from towtank.field.course import Course, course_of, held
 from towtank.field.log import CHANNELS, SeaLog
-from towtank.field.replay import Replay, flown
+from towtank.field.replay import Replay, Scatter, flown
 from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.pilot.law import Pilot
@@ -52,7 +52,7 @@ class _Sides:
     bias: Mapping[str, float]
     marks: Marks
     spans: tuple[tuple[int, int], ...]
-    seed: int
+    scatter: Scatter
 
 
 def compare(
@@ -97,12 +97,13 @@ def compare(
         )
     best = flown(course, names=names)
     fine = flown(course, names=names, finer=2)
-    many = flown(course, drawn(model, samples, seed), names=names, progress=bars)
+    scatter = drawn(model, samples, seed, log.bias)
+    many = flown(course, scatter, names=names, progress=bars)
     record = _record(course, log, model, names)
     lag = lag_of(
         record, {name: values[0] for name, values in best.channels.items()}, course.drive.clock.tick, align=align
     )
-    sides = _sides(course, log, record, best, fine, many, lag, seed)
+    sides = _sides(course, log, record, best, fine, many, lag, scatter)
     channels = tuple(_channel(name, sides, course) for name in _told(sides, course))
     metrics = tuple(score for score in (_metric(metric, sides, course.loop) for metric in METRICS) if score)
     included, missing = _uncertainties(course, log, names, samples)
@@ -141,8 +142,9 @@ def _record(course: Course, log: SeaLog, model: Model, names: Sequence[str]) -> 
 
 
 def _sides(
-    course: Course, log: SeaLog, record: dict[str, Array], best: Replay, fine: Replay, many: Replay, lag: Lag, seed: int
-) -> _Sides:
+    course: Course, log: SeaLog, record: dict[str, Array], best: Replay, fine: Replay, many: Replay, lag: Lag,
+    scatter: Scatter,
+) -> _Sides:  # fmt: skip
     tick = course.drive.clock.tick
     shift = lag.seconds if lag.applied else 0.0
     shared = [name for name in best.channels if name in record and name not in ("rudder", "elevator", "aileron")]
@@ -157,7 +159,7 @@ def _sides(
         {name: moved(best[name][0], shift, tick) for name in shared},
         {name: moved(fine[name][0], shift, tick) for name in shared},
         {name: moved(many[name], shift, tick) for name in shared},
-        sizes["std"], sizes["bias"], marks_of(kept, spans, tick), spans, seed,
+        sizes["std"], sizes["bias"], marks_of(kept, spans, tick), spans, scatter,
     )  # fmt: skip
 
 
@@ -167,11 +169,15 @@ def _told(sides: _Sides, course: Course) -> list[str]:
 
 
 def _noise(sides: _Sides, name: str, count: int, length: int) -> Array:
-    """Noise and bias (count, length) of the sensor of a channel, as the record states them."""
+    """Noise and bias (count, length) of the sensor of a channel, as the record states them.
+
+    The first ``scatter.count`` biases are those with which the craft began.
+    """
     place = list(CHANNELS).index(name)
-    random = np.random.default_rng((sides.seed, 2, place))
+    random = np.random.default_rng((sides.scatter.seed, 2, place))
     white = random.standard_normal((count, length), dtype=np.float32) * sides.std[name]
-    return np.asarray(white + random.standard_normal((count, 1)) * sides.bias[name])
+    offset = sides.scatter.bias.get(name, np.zeros(sides.scatter.count))
+    return np.asarray(white + np.resize(offset, count)[:, None])
 
 
 def band_of(values: Array) -> tuple[Array, Array]:
@@ -201,6 +207,11 @@ def _half(values: Array) -> float:
     return float(0.5 * (high - low))
 
 
+def _more(together: float, alone: float) -> float:
+    """What has to be added to ``alone``, as squares, for ``together``; 0 where the two make up for each other."""
+    return float(np.sqrt(max(together**2 - alone**2, 0.0))) if np.isfinite(together + alone) else float("nan")
+
+
 def _channel(name: str, sides: _Sides, course: Course) -> ChannelScore:
     record, model, craft = sides.record[name], sides.model[name], sides.craft[name]
     off = record - model
@@ -210,14 +221,15 @@ def _channel(name: str, sides: _Sides, course: Course) -> ChannelScore:
     wide_low, wide_high = band_of(craft + noise)
     scatter = craft[:, good] - model[good]
     with np.errstate(all="ignore"):
-        drift, fuzz = np.nanmean(scatter, axis=1), noise[:, good].mean(axis=1)
+        drift = np.nanmean(scatter, axis=1)
+        both = np.nanmean(scatter + noise[:, good], axis=1)
         expected = np.sqrt(np.nanmean((scatter + noise[:, good]) ** 2))
     numerical = abs(float(np.nanmean(sides.finer[name][good] - model[good]))) if good.any() else np.nan
     mean, rms = (float(np.mean(off[good])), float(np.sqrt(np.mean(off[good] ** 2)))) if good.any() else (np.nan,) * 2
     unit = CHANNELS[name][0]
     bias = Score(
         f"bias of {name}", name, unit, "mean of record less model", "ittc75030101", mean, 0.0,
-        Uncertainty(_half(drift), numerical, _half(fuzz)),
+        Uncertainty(_half(drift), numerical, _more(_half(both), _half(drift))),
     )  # fmt: skip
     spread = float(np.std(record[good])) if good.any() else np.nan
     return ChannelScore(
@@ -329,7 +341,11 @@ def _uncertainties(
         more = f" (assumed: {', '.join(guessed)})" if guessed else ""
         included.append(f"data: noise and bias of {', '.join(stated)}{more}")
     missing = ["currents that change in time and depth", "mass, centre of gravity and fins of the craft as it swam"]
-    if course.pilot is None:
+    fins = [name for name in log.bias if name.startswith("delta") and log.bias[name] > 0.0]
+    if course.pilot is None and fins:
+        included.append("input: fin angles, by their stated bias")
+        missing.append("noise of the fin angles in the record")
+    elif course.pilot is None:
         missing.append("errors of the fin angles in the record")
     else:
         missing.append("differences between this pilot, which sees without noise, and the one aboard")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from towtank.derive.covariance import root_of
 from towtank.errors import InputError
+from towtank.field.log import CHANNELS
 from towtank.field.replay import Scatter
 from towtank.frames import Array
 from towtank.model.equations import Model
@@ -20,8 +21,10 @@ TRIES = 30
 """Times a craft is drawn again."""
 
 
-def drawn(model: Model, count: int, seed: int = SEED) -> Scatter:
-    """``count`` craft: derivatives, current and states at the begin of each part.
+def drawn(model: Model, count: int, seed: int = SEED, bias: Mapping[str, float] | None = None) -> Scatter:
+    """``count`` craft: derivatives, current, states at the begin of each part, and offsets of the sensors.
+
+    bias : channel -> standard deviation of its offset, which lasts the record.
 
     Source     Normal distributions; the covariance is that of the derivatives (fit, mesh and model form together).
     Departure  A craft whose mass matrix is not positive definite is drawn again.
@@ -32,7 +35,7 @@ def drawn(model: Model, count: int, seed: int = SEED) -> Scatter:
         Fewer than two craft, or an uncertainty of the added masses as large as they are.
     """
     if count < 2:
-        raise InputError(f"compare: {count} craft make no band. Ask for two or more with --samples; 200 is usual.")
+        raise InputError(f"samples: {count} craft make no band. Ask for two or more with --samples; 200 is usual.")
     d, random = model.derivatives, np.random.default_rng((seed, 1))
     root = root_of(d.covariance, d.values)
     table = d.values + random.standard_normal((count, len(d.names))) @ root.T
@@ -47,7 +50,14 @@ def drawn(model: Model, count: int, seed: int = SEED) -> Scatter:
             "uncertainty of the added masses is as large as they are: narrow it."
         )
     varying = {name: table[:, i] for i, name in enumerate(d.names) if np.ptp(table[:, i]) > 0.0}
-    return Scatter(varying, random.standard_normal((count, 3)), seed)
+    current = random.standard_normal((count, 3))
+    places = list(CHANNELS)
+    offsets = {
+        name: size * np.random.default_rng((seed, 3, places.index(name))).standard_normal(count)
+        for name, size in (bias or {}).items()
+        if size > 0.0
+    }
+    return Scatter(varying, current, seed, offsets)
 
 
 def _sound(model: Model, columns: Mapping[str, Array]) -> NDArray[np.bool_]:
