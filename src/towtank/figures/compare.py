@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towtank.field.comparing.result import GROWTH, Comparison, Series
 from towtank.field.comparing.words import shown, unit_of
@@ -23,6 +24,8 @@ TITLES = {
 }  # fmt: skip
 SHOWN = ("psi", "r", "z", "theta", "ahead", "speed", "u", "slip", "v", "q", "phi")
 """Channels worth a history, first ones first."""
+DOTS = 1000
+"""Most samples of a record that are drawn."""
 NORMAL = 1.96
 """Half the 95 % interval of a standard normal variable."""
 
@@ -58,7 +61,7 @@ def history(it: Comparison, channel: str, ax: Axes | None = None) -> Axes:
     low, high = line(s.low[channel]), line(s.high[channel])
     ax.fill_between(s.time, low, high, color=BAND, alpha=0.6, linewidth=0, label="95 % of drawn craft")
     record = shown(1.0, unit) * s.record[channel]
-    held = np.isfinite(record)
+    held = _thinned(np.isfinite(record))
     ax.plot(s.time[held], record[held], ".", color=INK, markersize=1.4, label="record")
     ax.plot(s.time, line(s.model[channel]), color=FIT, linewidth=1.1, label="model")
     _ordered(ax, s, channel, unit)
@@ -67,6 +70,12 @@ def history(it: Comparison, channel: str, ax: Axes | None = None) -> Axes:
     head(ax, TITLES.get(channel, f"Fin {channel[5:]}"), level_line(it), _words(it))
     legend(ax, ncol=3, loc="upper left", bbox_to_anchor=(0.0, 1.0))
     return ax
+
+
+def _thinned(held: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Places of at most ``DOTS`` of the samples that are there."""
+    there = np.flatnonzero(held)
+    return there[:: max(1, -(-len(there) // DOTS))]
 
 
 def _ordered(ax: Axes, s: Series, channel: str, unit: str) -> None:
@@ -107,7 +116,7 @@ def track(it: Comparison, ax: Axes | None = None) -> Axes:
 
     s = it.series
     ax = new_axes(ax, width=4.6, height=4.0)
-    held = np.isfinite(s.record["x"]) & np.isfinite(s.record["y"])
+    held = _thinned(np.isfinite(s.record["x"]) & np.isfinite(s.record["y"]))
     ax.plot(s.record["y"][held], s.record["x"][held], ".", color=INK, markersize=1.8, label="record")
     broken = _broken(it, s)
     x, y = (np.where(broken, np.nan, s.model[name]) for name in ("x", "y"))

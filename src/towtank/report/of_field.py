@@ -45,7 +45,8 @@ def _one(it: Comparison, book: Sketchbook) -> list[Block]:
 
 
 def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+    symbol = len(text.partition(",")[0].partition(":")[0]) < 2  # x, y, u: symbols keep their letter
+    return f"{text if symbol else text[:1].upper() + text[1:]}".rstrip(".") + "."
 
 
 def _tone(it: Comparison) -> str:

@@ -20,7 +20,7 @@ from towtank.provenance import provenance
 
 SCHEMA, SERIES_SCHEMA = "towtank/compare/1", "towtank/compare-series/1"
 FILE, FOLDER = "compare.json", "compare"
-MOST = 4000
+MOST = 2000
 """Most samples of a series that is kept for figures; the numbers rest on all samples."""
 _SIDES = ("record", "model", "low", "high")
 

@@ -80,12 +80,26 @@ def verdict(it: Comparison) -> str:
         f"{done} of {known} numbers have |E| <= U_val, E being record less model: for these the model is validated at "
         "the level U_val, and no smaller error of it can be told from this record."
     )
+    if wide := vague(it):
+        text += (
+            f" Of {', '.join(wide)} U_val is as large as what the record does: the level says nothing of use. A shorter "
+            "horizon or derivatives better known narrow it."
+        )
     if beyond:
         text += (
             f" For {', '.join(beyond)} |E| > U_val: there E is the error of the model, in sign and size, but for what "
             "U_val leaves out."
         )
     return text
+
+
+def vague(it: Comparison) -> list[str]:
+    """Numbers that are validated at a level as large as the record's own spread, or its own value."""
+    channels = [
+        one.bias.name for one in it.channels
+        if one.bias.validated and one.nrms > 0.0 and one.bias.uncertainty.total > one.rms / one.nrms
+    ]  # fmt: skip
+    return channels + [one.name for one in it.metrics if one.validated and one.uncertainty.total > abs(one.record)]
 
 
 def limits(it: Comparison) -> str:
