@@ -82,7 +82,7 @@ def verdict(it: Comparison) -> str:
     )
     if wide := vague(it):
         text += (
-            f" Of {', '.join(wide)} U_val is as large as what the record does: the level says nothing of use. A shorter "
+            f" Of {', '.join(wide)} U_val is as large as what the record does: the level says nothing. A shorter "
             "horizon or derivatives better known narrow it."
         )
     if beyond:
