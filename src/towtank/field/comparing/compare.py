@@ -349,6 +349,7 @@ def _uncertainties(
         missing.append("errors of the fin angles in the record")
     else:
         missing.append("differences between this pilot, which sees without noise, and the one aboard")
+    missing += [f"what the record does not tell ({word})" for word in course.words if "rests at its trim" in word]
     if silent:
         missing.append(f"noise and bias of {', '.join(silent)}: not stated in the record")
     return tuple(included), tuple(missing)
