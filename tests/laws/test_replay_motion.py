@@ -238,3 +238,23 @@ def test_between_fixes_the_position_is_reckoned(model):
         # Fixes two minutes apart; the trapezoid rule and the begin's parabola leave some centimetres.
         np.testing.assert_allclose(part.begin.state[:2], [log["x"][part.first], log["y"][part.first]], atol=0.1)
     assert any("reckoned from the nearest fixes" in word for word in course.words)
+
+
+def test_errors_stated_of_begin_and_current_are_those_of_many_noisy_records(model):
+    log, _ = swum(model, [({"rudder": 0.05}, 300), ({"rudder": -0.05}, 300)])
+    std = {"psi": 0.005, "r": 0.001, "z": 0.01, "ahead": 0.01, "slip": 0.01, "x": 0.5, "y": 0.5}
+    places = {5: "psi", 11: "r", 2: "z"}
+    off, drift = [], []
+    for seed in range(12):
+        random = np.random.default_rng(seed)
+        noisy = {n: v + random.normal(0.0, std[n], len(v)) for n, v in log.channels.items() if n in std}
+        kept = {n: v for n, v in log.channels.items() if n in ("phi", "theta", "p", "q", "w", "plunge", *FINS)}
+        course = course_of(model, replace(log, channels={**kept, **noisy}), horizon=10.0, speed=1.0)
+        for part in course.parts[1:]:
+            errors = [part.begin.state[i] - log[name][part.first] for i, name in places.items()]
+            off.append(np.array(errors) / part.begin.state_std[list(places)])
+        drift.append((course.current.flow - CURRENT)[:2] / course.current.std[:2])
+    # 60 begins: the rms of a standard normal is 1 to 9 %. The fit of some twenty samples knows its error to 15 %.
+    np.testing.assert_allclose(np.sqrt(np.mean(np.square(off), axis=0)), 1.0, atol=0.3)
+    # 24 numbers, from twelve groups each: 1 to 15 %, and some more for the groups.
+    assert np.sqrt(np.mean(np.square(drift))) == pytest.approx(1.0, abs=0.35)

@@ -30,11 +30,12 @@ class Fit:
 def fitted(design: Array, values: Array, groups: NDArray[np.int64] | None = None) -> Fit:
     """``values`` (n,) by ``design`` (n, k), reweighted until outliers do not pull.
 
-    groups (n,) : samples of one number err alike; without groups each sample is its own.
+    groups (n,) : samples of one number err alike; the covariance is then the larger, unknown by unknown, of that of
+    independent samples and that of groups left out one at a time.
 
-    Source     huber1964; the covariance is cameronmiller2015, eq. 11, with their factor for few groups.
-    Valid      Fewer than half of the samples are wrong; more groups than unknowns, else the covariance is of single
-               samples.
+    Source     huber1964; bellmccaffrey2002 for the jackknife of groups, which a few groups and their leverage do not
+               make too small.
+    Valid      Fewer than half of the samples are wrong; more groups than unknowns, else all samples are independent.
     """
     weights = np.ones(len(values))
     scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
@@ -49,16 +50,30 @@ def fitted(design: Array, values: Array, groups: NDArray[np.int64] | None = None
         if np.abs(weights - former).max() < 1e-6:
             break
     off = values - A @ x
-    bread = np.linalg.pinv(A.T @ (A * weights[:, None]))
+    normal = A.T @ (A * weights[:, None])
     n, k = A.shape
-    own = groups if groups is not None and len(np.unique(groups)) > k else np.arange(n)
-    labels, place = np.unique(own, return_inverse=True)
-    scores = np.zeros((len(labels), k))
-    np.add.at(scores, place, A * (weights * off)[:, None])
-    g = len(labels)
-    factor = g / max(g - 1, 1) * (n - 1) / max(n - k, 1)
-    covariance = factor * bread @ (scores.T @ scores) @ bread
+    covariance = float((weights * off**2).sum() / max(n - k, 1)) * np.linalg.pinv(normal)
+    if groups is not None and len(np.unique(groups)) > k:
+        covariance = _larger(covariance, _left_out(A, weights, off, normal, groups))
     return Fit(x / scale, covariance / np.outer(scale, scale), weights)
+
+
+def _left_out(A: Array, weights: Array, off: Array, normal: Array, groups: NDArray[np.int64]) -> Array:
+    """Covariance (k, k) from the fits without one group each."""
+    labels = np.unique(groups)
+    moves = []
+    for label in labels:
+        own = groups == label
+        part = A[own] * weights[own, None]
+        moves.append(np.linalg.pinv(normal - part.T @ A[own]) @ (part.T @ off[own]))
+    each = np.array(moves)
+    return np.asarray((len(labels) - 1) / len(labels) * each.T @ each)
+
+
+def _larger(a: Array, b: Array) -> Array:
+    """``a`` or ``b``, grown so that no variance is below that of the other."""
+    ratio = np.sqrt(np.maximum(np.diag(a) / np.maximum(np.diag(b), 1e-300), 1.0))
+    return np.asarray(b * np.outer(ratio, ratio))
 
 
 @dataclass(frozen=True)

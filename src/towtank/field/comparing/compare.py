@@ -113,7 +113,8 @@ def compare(
         parts=tuple((float(best.time[p.first]), float(best.time[p.last])) for p in course.parts), lag=lag,
         current=course.current.flow, current_std=course.current.std, channels=channels, metrics=metrics,
         series=_series(best.time, sides), spectra=_spectra(sides), assumed=tuple(log.assumed), included=included,
-        missing=missing, words=(lag.words, *many.words), flags=dict(Counter(flag.kind for flag in log.flags)),
+        missing=missing, words=(lag.words, *many.words, *_doubts(log)),
+        flags=dict(Counter(flag.kind for flag in log.flags)),
         provenance=provenance(
             {"log": digest({n: v.tolist() for n, v in log.channels.items()}, 16),
              "derivatives": digest(model.derivatives.as_dict(), 16)}
@@ -321,6 +322,13 @@ def _spectra(sides: _Sides) -> tuple[Spectrum, ...]:
         shared = tuple(signals.coherence(own, other, spans, sides.marks.tick, band) for band in signals.BANDS)
         out.append(Spectrum(name, frequency, record, model, shared))
     return tuple(out)
+
+
+def _doubts(log: SeaLog) -> list[str]:
+    """The flags of a record in one line; nothing is left out because of them."""
+    found = Counter(flag.kind for flag in log.flags)
+    told = ", ".join(f"{count} {kind}" for kind, count in found.items())
+    return [f"flags of the record: {told}; flagged samples are compared as they stand"] if found else []
 
 
 def _uncertainties(
