@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from towtank.field.comparing import words
-from towtank.field.comparing.metrics import METRICS
+from towtank.field.comparing.metrics import ERRORS, METRICS
 from towtank.field.comparing.result import GROWTH, Comparison
 from towtank.figures import compare
 from towtank.report.blocks import Block, Section, Table, Text, missing, stated
@@ -83,6 +83,7 @@ def _in_time(it: Comparison) -> Table:
 
 
 def _fixed() -> Table:
-    rows = tuple((one.name, one.channel, words.unit_of(one.unit), one.formula, one.source) for one in METRICS)
+    errors = tuple((name, "each", "", formula, source) for name, (formula, source) in ERRORS.items())
+    rows = errors + tuple((one.name, one.channel, words.unit_of(one.unit), one.formula, one.source) for one in METRICS)
     note = "Fixed in advance; one of which a record has nothing is left out."
     return Table("Metrics", ("metric", "channel", "unit", "formula", "source"), rows, note)
