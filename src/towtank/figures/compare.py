@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towtank.field.comparing.result import GROWTH, Comparison, Series
-from towtank.field.comparing.words import shown, unit_of
+from towtank.field.comparing.words import shown, unit_of, vague
 from towtank.field.log import CHANNELS
 from towtank.figures.paper import BAD, BAND, FIT, GREY, INK, OK, frame, head, legend, new_axes, note
 from towtank.frames import Array
@@ -138,16 +138,21 @@ def track(it: Comparison, ax: Axes | None = None) -> Axes:
 
 
 def levels(it: Comparison, ax: Axes | None = None) -> Axes:
-    """E over U_val of every number: within -1 and 1 the model is validated at the level U_val."""
+    """E over U_val of every number: within -1 and 1 the model is validated at the level U_val.
+
+    Open marks: U_val is as large as what the record does, so that the level says nothing.
+    """
     scores = [one for one in it.scores if one.validated is not None and one.uncertainty.total > 0.0]
     ax = new_axes(ax, width=5.2, height=0.7 + 0.17 * max(len(scores), 4), bottom=0.5)
     ratio = np.array([one.error / one.uncertainty.total for one in scores])
     place = np.arange(len(scores))[::-1]
     ax.axvspan(-1.0, 1.0, color=BAND, alpha=0.45, linewidth=0)
     kept = np.clip(ratio, -4.0, 4.0)
-    for good, colour in ((True, OK), (False, BAD)):
-        at = (np.abs(ratio) <= 1.0) == good
-        ax.plot(kept[at], place[at], "o", color=colour, markersize=3.5)
+    wide = np.array([one.name in vague(it) for one in scores], dtype=bool)
+    for at, colour, face in (
+        ((np.abs(ratio) <= 1.0) & ~wide, OK, OK), ((np.abs(ratio) <= 1.0) & wide, OK, "white"), (np.abs(ratio) > 1.0, BAD, BAD),
+    ):  # fmt: skip
+        ax.plot(kept[at], place[at], "o", color=colour, markerfacecolor=face, markersize=3.5)
     for value, shown_at, row in zip(ratio, kept, place, strict=True):
         if abs(value) > 4.0:
             note(ax, f"{value:.1f}", (float(shown_at), float(row)), (5 if value < 0.0 else -5, -2.5),
@@ -160,7 +165,12 @@ def levels(it: Comparison, ax: Axes | None = None) -> Axes:
     ax.axvline(0.0, color="#aab3ba", linewidth=0.6)
     ax.set_xlim(-8.0, 4.3)
     ax.set_ylim(-0.7, len(scores) - 0.3)
-    head(ax, "Errors against what they may be", level_line(it), "E = record - model; tinted: |E| <= U_val, 95 %")
+    head(
+        ax,
+        "Errors against what they may be",
+        level_line(it),
+        "E = record - model; tinted: |E| <= U_val, 95 %; open: U_val as large as what the record does",
+    )
     return ax
 
 

@@ -50,8 +50,11 @@ def _sentence(text: str) -> str:
 
 
 def _tone(it: Comparison) -> str:
+    """Good when all numbers are validated, most of them at a level that says something; bad when most are not."""
     done, known = it.validated
-    return "plain" if not known else "good" if done == known else "bad" if done < 0.5 * known else "plain"
+    if known and done == known and len(words.vague(it)) < 0.5 * known:
+        return "good"
+    return "bad" if done < 0.5 * known else "plain"
 
 
 def _level(it: Comparison) -> str:
