@@ -149,9 +149,8 @@ def levels(it: Comparison, ax: Axes | None = None) -> Axes:
     ax.axvspan(-1.0, 1.0, color=BAND, alpha=0.45, linewidth=0)
     kept = np.clip(ratio, -4.0, 4.0)
     wide = np.array([one.name in vague(it) for one in scores], dtype=bool)
-    for at, colour, face in (
-        ((np.abs(ratio) <= 1.0) & ~wide, OK, OK), ((np.abs(ratio) <= 1.0) & wide, OK, "white"), (np.abs(ratio) > 1.0, BAD, BAD),
-    ):  # fmt: skip
+    within = np.abs(ratio) <= 1.0
+    for at, colour, face in ((within & ~wide, OK, OK), (within & wide, OK, "white"), (~within, BAD, BAD)):
         ax.plot(kept[at], place[at], "o", color=colour, markerfacecolor=face, markersize=3.5)
     for value, shown_at, row in zip(ratio, kept, place, strict=True):
         if abs(value) > 4.0:
