@@ -189,7 +189,8 @@ def _tell(reply: Reply, found: Comparison) -> None:
     done, known = found.validated
     reply.summary |= {
         "record": found.name, "record_level": found.record_level, "level": found.level, "loop": found.loop,
-        "horizon": found.horizon, "validated": {"within": done, "of": known, "at_no_level": words.vague(found)}, "lag_s": found.lag.seconds,
+        "horizon": found.horizon, "validated": {"within": done, "of": known, "at_no_level": words.vague(found)},
+        "lag_s": found.lag.seconds,
         "lag_applied": found.lag.applied, "current": found.current, "current_std": found.current_std,
         "channels": {
             one.channel: {
