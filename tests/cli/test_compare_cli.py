@@ -12,11 +12,15 @@ from typer.testing import CliRunner
 
 from sea_records import OPEN, swum
 from towtank.cli.app import app
-from towtank.craft.library import read_craft
-from towtank.derive.files import read_derivatives
+from towtank.craft.library import read_craft, write_craft_copy
+from towtank.derive.derive import derive
+from towtank.derive.files import write_derivatives
 from towtank.field.comparing.files import read_comparisons
 from towtank.field.files import write_log
 from towtank.model.equations import Model
+from towtank.plan.standard import standard_plan
+from towtank.tank.campaign import tow
+from towtank.tank.fast.tank import FastTank
 from towtank.trials.start import ballasted
 
 runner = CliRunner()
@@ -33,10 +37,12 @@ def answer(*words: str, code: int = 0) -> tuple[dict, str]:
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study of hokie up to its derivatives, and a record beside it."""
     folder = tmp_path_factory.mktemp("compare") / "hokie"
-    for words in (["plan", "hokie"], ["tow", "hokie"], ["derive", "hokie"]):
-        result = runner.invoke(app, [*words, "--out", str(folder)])
-        assert result.exit_code == 0, result.stderr
-    model = ballasted(Model(read_craft("hokie"), read_derivatives(folder / "derivatives.json")))
+    folder.mkdir()
+    write_craft_copy("hokie", folder)
+    craft = read_craft("hokie")
+    derivatives = derive(tow(standard_plan(craft), FastTank(members=4)))
+    write_derivatives(derivatives, folder / "derivatives.json")
+    model = ballasted(Model(craft, derivatives))
     log, _ = swum(model, OPEN)
     random = np.random.default_rng(1)
     channels = {n: v + random.normal(0.0, 0.002, len(v)) if n in ("psi", "r") else v for n, v in log.channels.items()}
