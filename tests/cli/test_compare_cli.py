@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,11 +15,13 @@ from sea_records import OPEN, swum
 from towtank.cli.app import app
 from towtank.craft.library import read_craft, write_craft_copy
 from towtank.derive.derive import derive
-from towtank.derive.files import write_derivatives
+from towtank.derive.files import read_derivatives, write_derivatives
 from towtank.field.comparing.files import read_comparisons
 from towtank.field.files import write_log
 from towtank.model.equations import Model
+from towtank.model.values import replaced
 from towtank.plan.standard import standard_plan
+from towtank.report.study import read_study
 from towtank.tank.campaign import tow
 from towtank.tank.fast.tank import FastTank
 from towtank.trials.start import ballasted
@@ -104,6 +107,15 @@ def test_the_report_has_a_section_with_the_level_of_the_record(study: Path):
     for word in ("Comparison with sea records", "SYNTHETIC record", "swim: error of every channel", "swim: metrics"):
         assert word in section
     assert section.count("<svg") >= 3
+
+
+def test_a_comparison_with_other_derivatives_is_called_one(study: Path, tmp_path: Path):
+    answer("compare", str(study), str(study.parent / "swim.nc"), "--ballasted", "--samples", "5")
+    copy = Path(shutil.copytree(study, tmp_path / "copy"))
+    assert not [words for words in read_study(copy).remarks if "compare.json" in words]
+    found = read_derivatives(copy / "derivatives.json")
+    write_derivatives(replaced(found, {"Nuv": 0.9 * found["Nuv"]}), copy / "derivatives.json")
+    assert any("compare.json was made with other derivatives" in words for words in read_study(copy).remarks)
 
 
 @pytest.mark.parametrize(

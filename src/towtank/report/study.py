@@ -245,7 +245,11 @@ def read_study(folder: Path | str) -> Study:
     if study.optimal and not own_plan(root):
         words = "plan.toml is not the plan of optimal.json, which is left out."
         study = replace(study, optimal={}, remarks=(*study.remarks, words))
-    return completed(replace(study, problems=tuple(problems), remarks=(*study.remarks, *_of_another_craft(study))))
+    return completed(
+        replace(
+            study, problems=tuple(problems), remarks=(*study.remarks, *_of_another_craft(study), *_of_others(study))
+        )
+    )
 
 
 def _results(root: Path, attempt: Callable[..., Any]) -> dict[str, Any]:
@@ -287,6 +291,18 @@ def _of_another_craft(study: Study) -> list[str]:
     if was == digest(replace(study.craft, speed=study.design.speed), 16):
         return []
     return ["design.json was made of another craft, or of this one before its file was changed. Run `towtank design`."]
+
+
+def _of_others(study: Study) -> list[str]:
+    """What is to be said of comparisons with records that were made with other derivatives than those of the report."""
+    from towtank.provenance import digest
+
+    if study.derivatives is None:
+        return []
+    own = digest(study.derivatives.as_dict(), 16)
+    old = [one.name for one in study.comparisons if one.provenance.get("inputs", {}).get("derivatives") != own]
+    words = "compare.json was made with other derivatives than these, for {}. Run `towtank compare` again."
+    return [words.format(", ".join(dict.fromkeys(old)))] if old else []
 
 
 def _runs(root: Path, attempt: Callable[..., Any]) -> tuple[Run, ...]:
