@@ -69,7 +69,9 @@ def _group(title: str, name: str, rows: list[tuple[float, str, int]]) -> Group:
     spoilt = {}
     if np.isnan(columns[name]).any():
         texts[name] = tuple(value for _, value, _ in rows)
-        bad = sum(np.isnan(x) and v.lower() not in ("nan", "") for x, (_, v, _) in zip(columns[name], rows, strict=True))
+        bad = sum(
+            np.isnan(x) and v.lower() not in ("nan", "") for x, (_, v, _) in zip(columns[name], rows, strict=True)
+        )
         if bad:
             spoilt[name] = int(bad)
         for i, (_, value, _) in enumerate(rows):

@@ -199,7 +199,9 @@ def ordered(time: Array, clock: Clock, where: str) -> Order:
     twice[1:] = time[kept][1:] == time[kept][:-1]
     if twice.any():
         at = time[kept[twice]]
-        flags.append(_flag("repeat", at, f"{where}: {int(twice.sum())} samples with the time of the one before: kept out"))
+        flags.append(
+            _flag("repeat", at, f"{where}: {int(twice.sum())} samples with the time of the one before: kept out")
+        )
         kept = kept[~twice]
     rising = _longest(time[kept])
     if len(rising) < len(kept):
@@ -208,8 +210,8 @@ def ordered(time: Array, clock: Clock, where: str) -> Order:
         flags.append(_flag("clock", time[kept[out]], words))
         if len(out) > OUT_OF_ORDER * len(kept):
             raise InputError(
-                f"{where}: {len(out)} of {len(kept)} samples are out of order of time. Is another column the clock? For "
-                'a clock that starts again write [clock] reset = "continue", or cut the file into one log for each.'
+                f"{where}: {len(out)} of {len(kept)} samples are out of order of time. Is another column the clock? "
+                'For a clock that starts again write [clock] reset = "continue", or cut the file into one log for each.'
             )
         kept = kept[rising]
     if len(kept) < 2:

@@ -38,7 +38,9 @@ _TESTED = (*MEASURED, "delta1", "delta2", "delta3", "delta4")
 Mask = NDArray[np.bool_]
 
 
-def doubts_of(time: Array, channels: Mapping[str, Array], limits: Mapping[str, tuple[float, float]]) -> tuple[Flag, ...]:
+def doubts_of(
+    time: Array, channels: Mapping[str, Array], limits: Mapping[str, tuple[float, float]]
+) -> tuple[Flag, ...]:
     """Flags on the values of ``channels`` (N,) [SI]; ``limits`` [SI] come before those of any craft."""
     flags: list[Flag] = []
     for name, column in channels.items():
@@ -100,7 +102,9 @@ def _still(name: str, time: Array, values: Array) -> list[Flag]:
     often = float(np.median(lengths[~stuck])) if (~stuck).any() else 1.0
     if often >= 2.0:
         again = int((lengths[~stuck] - 1).sum())
-        words = f"each value of {name} stands {often:g} times: the sensor is slower than the log, {again} samples are no "
+        words = (
+            f"each value of {name} stands {often:g} times: the sensor is slower than the log, {again} samples are no "
+        )
         out.append(Flag("repeat", name, float(time[0]), float(time[-1]), again, words + "new ones (held = true)"))
     return out
 

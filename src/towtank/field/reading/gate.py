@@ -15,7 +15,6 @@ import numpy as np
 
 from towtank.craft.craft import Craft
 from towtank.errors import InputError
-from towtank.field.files import read_log
 from towtank.field.log import CHANNELS, Flag, SeaLog
 from towtank.field.reading.axes import turned
 from towtank.field.reading.clock import Order, ordered, times_of
@@ -26,7 +25,7 @@ from towtank.field.reading.mapping import GIVEN, Channel, LogMap
 from towtank.field.reading.merging import merged
 from towtank.field.reading.note import MARK, numbers
 from towtank.field.reading.opening import Opened, clock_of, lane_of, opened
-from towtank.field.reading.raw import Group, Raw
+from towtank.field.reading.raw import Group, Raw, Rows
 from towtank.field.reading.values import Series, column_in_si, held_out, rows_where
 from towtank.frames import Array
 from towtank.provenance import provenance
@@ -64,11 +63,15 @@ def read_sea_log(
     columns = finished_angles(time, columns, found.mapping, said)
     columns, lost = _finished(time, columns, found, said)
     flags = (*flags, *lost, *_all_faults(found.raw, time))
-    limits = {key: _limits(key, channel) for key, channel in found.channels.items() if channel.limits and key in columns}
+    limits = {
+        key: _limits(key, channel) for key, channel in found.channels.items() if channel.limits and key in columns
+    }
     flags = (*flags, *doubts_of(time, columns, limits))
     if not columns:
         raise InputError(f"{path}: nothing of a record is mapped. Name columns in [channels].")
-    return _log(path, found, time - first, columns, _epoch(found, absolute, zero, first), datum, _moved(flags, first), said)
+    return _log(
+        path, found, time - first, columns, _epoch(found, absolute, zero, first), datum, _moved(flags, first), said
+    )
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class _Lane:
 
     group: Group
     order: Order
-    rows: Array
+    rows: Rows
 
 
 def _series(found: Opened, said: list[str]) -> tuple[dict[str, Series], tuple[Flag, ...], bool, float]:
@@ -151,8 +154,8 @@ def _finished(
 def _own_fins(columns: dict[str, Array], craft: Craft | None, said: list[str]) -> dict[str, Array]:
     if craft is None:
         raise InputError(
-            'fins = "vehicle": the sense of each fin is in the craft file. Name the craft, or write fins = "towtank" for '
-            "angles that are right-handed about the outward span."
+            'fins = "vehicle": the sense of each fin is in the craft file. Name the craft, or write fins = "towtank" '
+            "for angles that are right-handed about the outward span."
         )
     out = dict(columns)
     turned_round = []

@@ -57,7 +57,8 @@ class Channel(Clause):
     """Where a channel stands and how its numbers are read.
 
     column : its name; "TOPIC:field" where a file has several tables.   unit : where the file does not say it.
-    counts, points : of raw counts; two or more points (raw, value).   factor, offset : value = factor * number + offset.
+    counts, points : of raw counts; two or more points (raw, value).
+    factor, offset : value = factor * number + offset.
     missing : numbers that stand for nothing measured.   where : only rows in which other columns hold these values.
     sensor : of ``sensors``, whose place the channel belongs to.   magnetic : from magnetic north.
     held : a value that repeats the last one was not measured anew.   time : a clock column of its own.

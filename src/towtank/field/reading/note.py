@@ -1,5 +1,4 @@
-"""What towtank says of its own logs inside files of other formats: craft, zero of time, noise, and that they are made
-up."""
+"""What towtank says of its own logs inside files of other formats: craft, zero of time, noise, and if made up."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 from collections import Counter
@@ -67,8 +68,10 @@ def text_lines(path: Path) -> tuple[Lines, tuple[Fault, ...]]:
     if not clean:
         raise InputError(f"{path} holds no line of text. It is damaged, or of another format.")
     lost = [i for i, line in lines if _CONTROLS & set(line) or (odd and line.count("\ufffd") > 4)]
-    said = (Fault(len(lost), f"{_places(lost)} not text: left out"),) if lost else ()
-    return clean, said
+    said = [Fault(len(lost), f"{_places(lost)} not text: left out")] if lost else []
+    if not found.endswith(("\n", "\r")):
+        said.append(Fault(1, f"line {lines[-1][0]}, the last, has no end: it may be cut off"))
+    return clean, tuple(said)
 
 
 def _mostly_text(found: str) -> bool:
@@ -160,10 +163,9 @@ def _group(title: str, headers: list[str], rows: list[list[str]], numbers: list[
 
 def _numbers(cells: Sequence[str], decimal: bool) -> tuple[Array, int]:
     """Cells as numbers, NaN where a cell holds none; and how many of those hold something else."""
-    try:
-        return np.where(np.isfinite(found := np.array(cells, dtype=float)), found, np.nan), 0
-    except ValueError:
-        pass
+    with contextlib.suppress(ValueError):
+        found = np.array(cells, dtype=float)
+        return np.where(np.isfinite(found), found, np.nan), 0
     values, bad = np.full(len(cells), np.nan), 0
     for i, cell in enumerate(cells):
         if cell.lower() in MISSING:
