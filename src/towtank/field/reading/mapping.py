@@ -61,7 +61,8 @@ class Channel(Clause):
     factor, offset : value = factor * number + offset.
     missing : numbers that stand for nothing measured.   where : only rows in which other columns hold these values.
     sensor : of ``sensors``, whose place the channel belongs to.   magnetic : from magnetic north.
-    held : a value that repeats the last one was not measured anew.   time : a clock column of its own.
+    held : a value that repeats the last one was not measured anew.   hold : a value stands until the next one.
+    time : a clock column of its own.
     std, bias, assumed : of the noise.   limits : what it can be.   optional : may be absent.
     """
 
@@ -76,6 +77,7 @@ class Channel(Clause):
     sensor: str = ""
     magnetic: bool = False
     held: bool = False
+    hold: bool = False
     time: str = ""
     std: Number | None = None
     bias: Number | None = None

@@ -35,7 +35,7 @@ def merged(series: Mapping[str, Series], clock: Clock, said: list[str]) -> tuple
     if len(tables) == 1:
         base = every
     else:
-        finest = min(float(np.diff(time).min()) for time in tables if len(time) > 1)
+        finest = min((float(np.diff(time).min()) for time in tables if len(time) > 1), default=np.inf)
         within = min(si(clock.within, "s", "clock, within"), 0.49 * finest / len(tables))
         base = every[np.diff(every, prepend=-np.inf) > within]
     _refuse(len(base))
@@ -71,6 +71,13 @@ def _on_ticks(
         + (f"; left out where two fell on one: {words}" * bool(words))
     )
     return base, out
+
+
+def stood(values: Array) -> Array:
+    """Values (N,) that stand until the next one."""
+    known = np.isfinite(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
 
 
 def _refuse(count: int) -> None:

@@ -13,6 +13,11 @@ MARK = "-synthetic"
 WORDS = "SYNTHETIC: made up by towtank, no record of a craft at sea"
 
 
+def says_so(text: str) -> bool:
+    """Whether a comment or a text says that the log is made up."""
+    return text.strip().startswith(WORDS.partition(":")[0])
+
+
 def note_of(log: SeaLog) -> dict[str, Any]:
     """The note of a record."""
     return {

@@ -14,6 +14,7 @@ import numpy as np
 
 from towtank.errors import InputError
 from towtank.field.reading.mapping import Text
+from towtank.field.reading.note import says_so
 from towtank.field.reading.raw import Fault, Group, Raw
 from towtank.frames import Array
 from towtank.tank.imported.delimited import COMMENTS
@@ -28,6 +29,8 @@ SPOILT_LINES = 0.5
 CONTROL = 0.01
 """Share of control characters above which a file is taken for no text; damaged blocks of a log stay below it."""
 _CONTROLS = frozenset(chr(code) for code in (*range(9), 11, 12, *range(14, 32)))
+STATE = "Error State"
+"""Column of an Iver log, which has no comments, that says whether it is made up."""
 Lines = list[tuple[int, str]]
 
 
@@ -42,6 +45,8 @@ def read_delimited_log(path: Path, text: Text) -> Raw:
     kept, faults = text_lines(path)
     note = _note(kept)
     group, spoilt = table_of_lines(path.name, kept, text)
+    if any(says_so(cell) for cell in group.texts.get(STATE, ())[:1]):
+        note = {"synthetic": True, **note}
     return Raw(path.name, {"": group}, None, note, (*faults, *spoilt))
 
 
@@ -83,15 +88,18 @@ def _mostly_text(found: str) -> bool:
 
 def _note(lines: Lines) -> Mapping[str, Any]:
     """What towtank wrote of its own file in a comment."""
+    note: dict[str, Any] = {}
     for _, line in lines[:40]:
-        bare = line.strip().strip('"').lstrip("#%/ ").strip()
+        if not line.lstrip().startswith(COMMENTS):
+            continue
+        bare = line.strip().lstrip("#%/ ").strip()
+        if says_so(bare):
+            note["synthetic"] = True
         if bare.startswith(NOTE):
-            try:
+            with contextlib.suppress(ValueError):
                 found = json.loads(bare.removeprefix(NOTE))
-            except ValueError:
-                continue
-            return found if isinstance(found, dict) else {}
-    return {}
+                note |= found if isinstance(found, dict) else {}
+    return note
 
 
 def table_of_lines(title: str, lines: Lines, text: Text) -> tuple[Group, tuple[Fault, ...]]:

@@ -21,6 +21,8 @@ from towtank.frames import Array
 
 _DEG = 180.0 / np.pi
 KNOT = 1852.0 / 3600.0
+NOWHERE = (np.pi / 6.0, -np.pi / 6.0)
+"""Datum of an Iver log of a record without one: 30 deg north, 30 deg west."""
 _MOOS: Mapping[str, tuple[str, float]] = {
     "x": ("NAV_Y", 1.0), "y": ("NAV_X", 1.0), "z": ("NAV_DEPTH", 1.0), "psi": ("NAV_HEADING", _DEG),
     "speed": ("NAV_SPEED", 1.0), "heading_order": ("DESIRED_HEADING", _DEG), "depth_order": ("DESIRED_DEPTH", 1.0),
@@ -217,7 +219,7 @@ def write_iver(log: SeaLog, path: Path) -> Path:
         raise InputError(f"log {log.name}: samples closer than the 0.01 s of an Iver log. Write another format.")
     cells: dict[str, list[str]] = {}
     if log.has("x", "y"):
-        latitude, longitude = latitude_longitude(log["x"], log["y"], log.datum or (0.0, 0.0))
+        latitude, longitude = latitude_longitude(log["x"], log["y"], log.datum or NOWHERE)
         cells["Latitude"], cells["Longitude"] = _cells(latitude * _DEG, 7), _cells(longitude * _DEG, 7)
     heading, ordered = log["psi"] % (2.0 * np.pi), log["heading_order"] % (2.0 * np.pi)
     for column, values, digits in (
