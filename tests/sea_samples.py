@@ -89,8 +89,7 @@ def kestrel(folder):
     d = truth(t)
     dvl = velocity_of(t, DVL)
     depth = place_of(t, DEPTH_CELL)[:, 2]
-    head = ["t_ms", "lat", "lon", "depth (m)", "heading (deg)", "pitch (deg)", "roll (deg)", "p", "q", "r", "dvl_x (kn)",
-            "dvl_y (kn)", "dvl_z (kn)", "s1", "s2", "s3", "s4", "mode"]  # fmt: skip
+    head = ["t_ms", "lat", "lon", "depth (m)", "heading (deg)", "pitch (deg)", "roll (deg)", "p", "q", "r", "dvl_x (kn)", "dvl_y (kn)", "dvl_z (kn)", "s1", "s2", "s3", "s4", "mode"]  # fmt: skip
     lines = [f"# {MADE_UP}", ";".join(head)]
     for i, at in enumerate(t):
         counts = [1500.0 + 10.0 * np.degrees(d[f"delta{k + 1}"][i]) for k in range(4)]
@@ -127,7 +126,8 @@ def iver(folder):
     lat, lon = (np.degrees(a) for a in latitude_longitude(d["x"], d["y"], DATUM))
     head = ("Latitude;Longitude;Time;Date;Number of Sats;GPS Speed (Kn);C Magnetic Heading;C True Heading;Pitch Angle;"
             "Roll Angle;C Inside Temp (c);DFS Depth (m);Batt State;Next Speed (kn);Vehicle Speed (kn);Motor Speed CMD;"
-            "Next Heading;Depth Goal (m);Vehicle State;Error State;Fin Pitch R;Fin Pitch L;Fin Yaw T;Fin Yaw B;")  # fmt: skip
+            "Next Heading;Depth Goal (m);Vehicle State;Error State;Fin Pitch R;Fin Pitch L;Fin Yaw T;"
+            "Fin Yaw B;")  # fmt: skip
     lines = [head]
     for i, at in enumerate(t):
         stamp = datetime.datetime.fromtimestamp(EPOCH + at, tz=datetime.UTC)
@@ -135,8 +135,9 @@ def iver(folder):
         place = ["0", "0"] if blind else [f"{lat[i]:.8f}", f"{lon[i]:.8f}"]
         speed = np.hypot(d["u"][i], d["v"][i]) / 0.5144444444444445
         counts = [f"{128.0 + 3.2 * np.degrees(d[f'delta{k}'][i]):.1f}" for k in (3, 4, 1, 2)]
-        row = [*place, f"{stamp.hour}:{stamp:%M:%S}.00", f"{stamp.month}/{stamp.day}/{stamp.year}", "0" if blind else "9",
-               "0", f"{heading(d['psi'][i]):.1f}", f"{heading(d['psi'][i]):.2f}", f"{np.degrees(d['theta'][i]):.2f}",
+        day = f"{stamp.month}/{stamp.day}/{stamp.year}"
+        row = [*place, f"{stamp.hour}:{stamp:%M:%S}.00", day, "0" if blind else "9", "0",
+               f"{heading(d['psi'][i]):.1f}", f"{heading(d['psi'][i]):.2f}", f"{np.degrees(d['theta'][i]):.2f}",
                f"{np.degrees(d['phi'][i]):.2f}", "31.2", f"{d['z'][i]:.3f}", "N", "3.0", f"{speed:.3f}", "160", "90.0",
                "5.0", "SYNTHETIC", "SYNTHETIC", *counts]  # fmt: skip
         lines.append(";".join(row) + ";")
@@ -155,6 +156,7 @@ def imc(folder):
 
     t = clock()
     d = truth(t)
+    wrapped = d | {"psi": (d["psi"] + np.pi) % (2.0 * np.pi) - np.pi}
     state = ["x", "y", None, "phi", "theta", "psi", "u", "v", "w", None, None, None, "p", "q", "r", "z", None]
     message(
         "EstimatedState",
@@ -162,8 +164,7 @@ def imc(folder):
         "w (m/s), vx (m/s), vy (m/s), vz (m/s), p (rad/s), q (rad/s), r (rad/s), depth (m), alt (m)",
         [
             (at, f"{DATUM[0]:.8f}, {DATUM[1]:.8f}, 0, " + ", ".join(
-                "0" if name is None else f"{((d[name][i] + np.pi) % (2 * np.pi) - np.pi if name == 'psi' else d[name][i]):.6f}"
-                for name in state))
+                "0" if name is None else f"{wrapped[name][i]:.6f}" for name in state))
             for i, at in enumerate(t)
         ],
     )  # fmt: skip
@@ -189,13 +190,13 @@ def moos(folder):
     """As pLogger of MOOS-IvP writes it: every variable when it is posted, some of them text."""
     t = clock()
     posted = [(0.0, "DB_TIME", "MOOSDB_sample", f"{EPOCH:.3f}"), (0.001, "SAMPLE_NOTE", "pSample", MADE_UP)]
-    d = truth(t + 0.001)
+    d, angles = truth(t + 0.001), np.degrees(fins(t + 0.031))
     for i, at in enumerate(t):
         posted += [
             (at + 0.001, "NAV_X", "pNav", f"{d['y'][i]:.5f}"), (at + 0.001, "NAV_Y", "pNav", f"{d['x'][i]:.5f}"),
             (at + 0.001, "NAV_DEPTH", "pNav", f"{d['z'][i]:.5f}"),
             (at + 0.001, "NAV_HEADING", "pNav", f"{heading(d['psi'][i]):.5f}"),
-            (at + 0.031, "FIN_STATE", "iFins", ",".join(f"FIN{k + 1}={np.degrees(fins(at[None] + 0.031)[0, k]):.4f}" for k in range(4))),
+            (at + 0.031, "FIN_STATE", "iFins", ",".join(f"FIN{k + 1}={angles[i, k]:.4f}" for k in range(4))),
         ]  # fmt: skip
     posted += [(0.2, "DESIRED_RUDDER", "pHelm", "3.5"), (4.2, "DESIRED_RUDDER", "pHelm", "-2")]
     lines = ["%" * 60, "%% LOG FILE:       moos.alog", "%% FILE OPENED ON  Sat May  2 09:30:00 2026",

@@ -6,8 +6,8 @@ import shutil
 
 import numpy as np
 import pytest
-import sea_samples as sea
 
+import sea_samples as sea
 from towtank.errors import InputError
 from towtank.field.reading import read_sea_log
 

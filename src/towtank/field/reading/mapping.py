@@ -103,7 +103,7 @@ class Clock(Clause):
     utc_offset: Number = 0.0
     leap_seconds: int = 18
     reset: Literal["keep out", "continue"] = "keep out"
-    within: Number = 1e-3
+    within: Number = 1e-4
     step: Number | None = None
 
 

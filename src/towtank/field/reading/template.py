@@ -33,7 +33,7 @@ unit = "s"                   # of numbers: s, ms, us, ns
     "own": """
 # The file times its own rows. step puts all on uniform ticks; within joins stamps that are one instant.
 [clock]
-within = "1 ms"
+within = "0.1 ms"
 # step = "0.1 s"
 """,
 }
