@@ -89,8 +89,9 @@ def kestrel(folder):
     d = truth(t)
     dvl = velocity_of(t, DVL)
     depth = place_of(t, DEPTH_CELL)[:, 2]
-    head = ["t_ms", "lat", "lon", "depth (m)", "heading (deg)", "pitch (deg)", "roll (deg)", "p", "q", "r", "dvl_x (kn)", "dvl_y (kn)", "dvl_z (kn)", "s1", "s2", "s3", "s4", "mode"]  # fmt: skip
-    lines = [f"# {MADE_UP}", ";".join(head)]
+    head = "t_ms;lat;lon;depth (m);heading (deg);pitch (deg);roll (deg);p;q;r;dvl_x (kn);dvl_y (kn);dvl_z (kn);"
+    head += "s1;s2;s3;s4;mode"
+    lines = [f"# {MADE_UP}", head]
     for i, at in enumerate(t):
         counts = [1500.0 + 10.0 * np.degrees(d[f"delta{k + 1}"][i]) for k in range(4)]
         row = [
