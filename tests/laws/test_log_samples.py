@@ -273,3 +273,32 @@ def test_degree_signs_of_latin_1_and_rows_in_reverse(tmp_path):
     np.testing.assert_allclose(log["psi"], np.radians(350.0 + 3.0 * np.arange(10.0)))
     assert [(flag.kind, flag.count) for flag in log.flags] == [("clock", 10)]
     assert "turned round" in log.flags[0].words
+
+
+def test_messages_of_other_systems_in_an_imc_log_are_left_out_and_counted(tmp_path):
+    shutil.copytree(LOGS / "imc", tmp_path / "imc")
+    path = tmp_path / "imc" / "EstimatedState.csv"
+    lines = path.read_bytes().decode().split("\r\n")
+    strange = [line.replace("lauv-sample", "ccu-boat") for line in lines[5:8]]
+    path.write_text("\r\n".join([*lines[:8], *strange, *lines[8:]]), newline="")
+    log, whole = read_sea_log(tmp_path / "imc"), read_sea_log(LOGS / "imc")
+    np.testing.assert_array_equal(log["x"], whole["x"])
+    assert [(flag.kind, flag.count) for flag in log.flags] == [("format", 3)]
+    assert "3 messages of ccu-boat left out; the craft is lauv-sample" in log.flags[0].words
+
+
+def test_a_csv_whose_gps_has_a_clock_of_its_own(tmp_path):
+    t = np.arange(0.0, 6.0, 0.5)
+    fixes = np.where(np.arange(12) % 4 == 0, t + 0.123, np.nan)
+    rows = [
+        f"{a},{5 + a},{'' if np.isnan(b) else b},{'' if np.isnan(b) else 2 * b}" for a, b in zip(t, fixes, strict=True)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join(["t,depth,tg,xg", *rows, ""]))
+    text = 'schema = "towtank/sea-log/1"\n[clock]\ncolumns = "t"\n[channels]\nz = { column = "depth", unit = "m" }\n'
+    (tmp_path / "map.toml").write_text(text + 'x = { column = "xg", unit = "m", time = "tg" }\n')
+    log = read_sea_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    known = np.isfinite(log["x"])
+    np.testing.assert_allclose(log["x"][known], 2.0 * log.time[known])
+    np.testing.assert_allclose(log.time[known], [0.123, 2.123, 4.123])
+    assert np.isfinite(log["z"]).sum() == 12
+    assert log.flags == ()

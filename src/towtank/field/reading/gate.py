@@ -130,6 +130,8 @@ def _series(found: Opened, said: list[str]) -> tuple[dict[str, Series], tuple[Fl
             continue
         times, counted = times_of(group, clock_of(channel, found), found.mapping.clock)
         absolute = absolute or counted
+        if channel.time and not group.spoilt.get(channel.time):  # rows of the common clock have no time of this one
+            rows = rows[np.isfinite(times[rows])]
         order = ordered(times[rows], found.mapping.clock, group.table.title)
         lanes[key], raw_times[key] = _Lane(group, order, rows), order.time
         # What is given only when it changes has no rate that a hole could be seen by.
