@@ -401,6 +401,16 @@ def test_spikes_are_flagged_and_nothing_else_is(folder):
     assert np.flatnonzero(outliers(z)).tolist() == [50, 51, 200]
 
 
+@pytest.mark.parametrize(("noise", "jumped"), [(0.0, 30.0), (1.5, 30.0), (0.02, -4.0), (1.5, 0.0), (0.0, 0.0)])
+def test_a_place_that_jumps_and_stays_is_flagged_where_it_does(noise, jumped, folder):
+    rng = np.random.default_rng(4)
+    t = 0.1 * np.arange(300)
+    x = 2.0 * t + noise * rng.standard_normal(300) + jumped * (np.arange(300) >= 120)
+    log = read(folder, {"t": t, "x": x}, {"x": "x"})
+    seen = [(flag.kind, flag.start) for flag in log.flags]
+    assert seen == ([("outlier", pytest.approx(11.9))] if jumped else [])
+
+
 def test_noise_steps_and_turns_are_no_outliers():
     rng = np.random.default_rng(0)
     found = sum(int(outliers(rng.standard_normal(1000)).sum()) for _ in range(100))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -302,3 +303,17 @@ def test_a_csv_whose_gps_has_a_clock_of_its_own(tmp_path):
     np.testing.assert_allclose(log.time[known], [0.123, 2.123, 4.123])
     assert np.isfinite(log["z"]).sum() == 12
     assert log.flags == ()
+
+
+def test_without_the_library_of_bags_the_way_to_it_is_told(monkeypatch, tmp_path):
+    from towtank.field.writing import write_as
+
+    log = read_sea_log(LOGS / "tern.nc", LOGS / "tern.toml")
+    for name in ("rosbags.highlevel", "rosbags.typesys"):
+        monkeypatch.setitem(sys.modules, name, None)
+    for path, mapping in (("petrel.bag", "petrel.toml"), ("petrel2", None)):
+        with pytest.raises(InputError, match=r"needs rosbags. Install it: pip install"):
+            read_sea_log(LOGS / path, LOGS / mapping if mapping else None)
+    for form in ("ros1", "ros2"):
+        with pytest.raises(InputError, match=r"needs rosbags. Install it: pip install"):
+            write_as(log, tmp_path / "log", form)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +34,9 @@ def read_ros(path: Path, wanted: Mapping[str, Sequence[str]], sparse: bool) -> R
     InputError
         ``rosbags`` is not installed, the bag is damaged, or it lacks a topic or a field.
     """
+    opened = _library(path)
     try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise InputError(f'{path}: reading a bag needs rosbags. Install it: pip install "towtank[field]".') from None
-    usual = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)
-    try:
-        with AnyReader([path], default_typestore=usual) as reader:
+        with opened() as reader:
             return _read(path, reader, wanted, sparse)
     except InputError:
         raise
@@ -53,15 +48,30 @@ def read_ros(path: Path, wanted: Mapping[str, Sequence[str]], sparse: bool) -> R
 
 
 def topics_of(path: Path) -> tuple[str, ...]:
-    """Topics of a bag; none where it cannot be opened."""
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
+    """Topics of a bag; none where it cannot be opened.
 
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+    Raises
+    ------
+    InputError
+        ``rosbags`` is not installed.
+    """
+    opened = _library(path)
+    try:
+        with opened() as reader:
             return tuple(connection.topic for connection in reader.connections)
     except Exception:  # as in read_ros, which tells the reason
         return ()
+
+
+def _library(path: Path) -> Callable[[], Any]:
+    """What opens the bag at ``path``; its messages are those of the usual types where it does not hold their own."""
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError(f'{path}: reading a bag needs rosbags. Install it: pip install "towtank[field]".') from None
+    usual = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)
+    return lambda: AnyReader([path], default_typestore=usual)
 
 
 def _read(path: Path, reader: Any, wanted: Mapping[str, Sequence[str]], sparse: bool) -> Raw:
