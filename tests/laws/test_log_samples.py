@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import shutil
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import sea_samples as sea
-from towtank.errors import InputError
+from towtank.errors import InputError, TowtankError
 from towtank.field.reading import read_sea_log
 
 LOGS = sea.FOLDER
@@ -317,3 +320,41 @@ def test_without_the_library_of_bags_the_way_to_it_is_told(monkeypatch, tmp_path
     for form in ("ros1", "ros2"):
         with pytest.raises(InputError, match=r"needs rosbags. Install it: pip install"):
             write_as(log, tmp_path / "log", form)
+
+
+DAMAGED = {
+    "kestrel.csv": "kestrel.toml", "heron.csv": "heron.toml", "iver.log": None, "moos.alog": "moos.toml",
+    "osprey.mat": "osprey.toml", "osprey73.mat": "osprey.toml", "tern.nc": "tern.toml", "petrel.bag": "petrel.toml",
+    "petrel3/petrel3.mcap": "petrel.toml", "petrel2/petrel2.db3": "petrel.toml", "imc/EstimatedState.csv": None,
+}  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    name=st.sampled_from(sorted(DAMAGED)), place=st.floats(0.0, 1.0), length=st.integers(1, 400),
+    seed=st.integers(0, 99), how=st.sampled_from(["overwritten", "lost", "repeated", "cut"]),
+)  # fmt: skip
+def test_a_log_damaged_anywhere_is_read_with_flags_or_refused_in_words(
+    name, place, length, seed, how, tmp_path_factory
+):
+    content = bytearray((LOGS / name).read_bytes())
+    at = int(place * (len(content) - 1))
+    noise = np.random.default_rng(seed).integers(0, 256, length, dtype=np.uint8).tobytes()
+    match how:
+        case "overwritten":
+            content[at : at + length] = noise
+        case "lost":
+            del content[at : at + length]
+        case "repeated":
+            content[at:at] = content[at : at + length]
+        case "cut":
+            del content[at:]
+    path = tmp_path_factory.mktemp("damaged") / Path(name).name
+    path.write_bytes(bytes(content))
+    mapping = DAMAGED[name]
+    try:
+        log = read_sea_log(path, LOGS / mapping if mapping else None)
+    except TowtankError as error:
+        assert len(str(error)) > 20  # noqa: PT017
+    else:
+        assert (np.diff(log.time) > 0.0).all()
