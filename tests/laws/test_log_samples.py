@@ -334,9 +334,7 @@ DAMAGED = {
     name=st.sampled_from(sorted(DAMAGED)), place=st.floats(0.0, 1.0), length=st.integers(1, 400),
     seed=st.integers(0, 99), how=st.sampled_from(["overwritten", "lost", "repeated", "cut"]),
 )  # fmt: skip
-def test_a_log_damaged_anywhere_is_read_with_flags_or_refused_in_words(
-    name, place, length, seed, how, tmp_path_factory
-):
+def test_a_log_damaged_anywhere_is_read_or_refused_in_words(name, place, length, seed, how, tmp_path_factory):
     content = bytearray((LOGS / name).read_bytes())
     at = int(place * (len(content) - 1))
     noise = np.random.default_rng(seed).integers(0, 256, length, dtype=np.uint8).tobytes()
