@@ -21,6 +21,7 @@ from towtank.cli.pilot import pilot
 from towtank.cli.plan import plan
 from towtank.cli.report import report
 from towtank.cli.run import run
+from towtank.cli.sea import sea
 from towtank.cli.solve_case import solve_case
 from towtank.cli.status import status
 from towtank.cli.sweep import sweep
@@ -72,6 +73,7 @@ for _command in (
     tune,
     mc,
     faults,
+    sea,
     assess,
     sweep,
     design,

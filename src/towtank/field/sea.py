@@ -1,9 +1,9 @@
 """Craft that swim through a varying current: the truth behind a synthetic record.
 
 The engine holds one current in a run, so a trial is flown in pieces of ``Environment.piece`` seconds, each with the
-current at the craft's depth and time when it begins. State and memory of the steering go from piece to piece, and so do
-a leg's remaining time and the side from which it waits for its event. The state holds velocities over ground: when the
-current changes by dc, the velocity through the water changes by -dc at once, as for a body of inertia that an eddy hits.
+current at the craft's depth and time when it begins. State and memory of the steering go from piece to piece, and so
+does what is left of a leg. The state holds velocities over ground: when the current changes by dc, the velocity through
+the water changes by -dc at once, as if the craft swam into an eddy with a sharp edge.
 """
 
 from __future__ import annotations
@@ -116,8 +116,8 @@ def _check(trial: Ready, environment: Environment, count: int) -> None:
     waiting = [leg.name for leg in trial.legs if leg.until is not None]
     if count > 1 and waiting:
         raise InputError(
-            f"sea: leg {waiting[0]!r} of {trial.name} ends by an event, which comes to each of {count} craft at another "
-            "time. Let one craft swim at a time, or give legs that end by time."
+            f"sea: leg {waiting[0]!r} of {trial.name} ends by an event, which comes to each of {count} craft at a time "
+            "of its own. Let one craft swim at a time, or give legs that end by time."
         )
     if trial.setting.pilot is not None and not trial.setting.pilot.sensors.exact:
         raise InputError(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -133,14 +134,15 @@ EXACT = Instruments(assumed=False)
 
 def observe(
     swum: Swim, instruments: Instruments = STANDARD, seed: int = 0, *, one: int = 0, epoch: float | None = None,
-    datum: tuple[float, float] | None = None, name: str | None = None,
+    datum: tuple[float, float] | None = None, name: str | None = None, notes: Sequence[str] = (),
 ) -> SeaLog:  # fmt: skip
     """The record that ``instruments`` write of craft ``one`` of ``swum``, marked as synthetic.
 
     Parameters
     ----------
     seed : of the noise; the same seed gives the same record.   epoch [s, UTC] : of its first row.   datum : latitude
-    and longitude [rad] of x = y = 0.   name : of the record, the trial's with ``-synthetic`` when left out.
+    and longitude [rad] of x = y = 0.   name : of the record, the trial's with ``-synthetic`` when left out.   notes :
+    that are kept in the provenance beside those of the trial.
 
     Reading k of an instrument is taken in the row nearest to k periods. It holds the truth ``latency`` ago, a straight
     line between control periods; orders and commands are those that stand.
@@ -169,7 +171,7 @@ def observe(
         channels={name: values[kept] for name, values in channels.items()}, std=shape["std"], bias=shape["bias"],
         assumed=noisy, synthetic=True, epoch=epoch, datum=datum, flags=flags,
         conversions=("Synthetic: a program made this record up from a model; no craft was at sea.",),
-        provenance=_origin(swum, one, instruments, seed, draw.offsets),
+        provenance=_origin(swum, one, instruments, seed, draw.offsets, notes),
     )  # fmt: skip
 
 
@@ -185,10 +187,10 @@ def _rows(swum: Swim, instruments: Instruments, one: int) -> Array:
             f"sea: {swum.trial.name} lasted {last:.3g} s, less than two rows {instruments.period:g} s apart. Give a "
             "longer trial or a shorter period."
         )
-    return instruments.period * np.arange(count)
+    return np.asarray(instruments.period * np.arange(count))
 
 
-def _truth(swum: Swim, one: int, name: str, instruments: Instruments) -> Any:
+def _truth(swum: Swim, one: int, name: str, instruments: Instruments) -> Callable[[Array], Array]:
     """Function of the times (M,) of the rows that gives the truth (M,) of ``name`` then, less the latency."""
     time, values, late = swum.time, swum.channels[name][one], instruments.of(name).latency
 
@@ -196,7 +198,7 @@ def _truth(swum: Swim, one: int, name: str, instruments: Instruments) -> Any:
         when = np.maximum(rows - late, time[0])
         if name in SMOOTH:
             held = np.isfinite(values)
-            return np.interp(when, time[held], values[held])
+            return np.asarray(np.interp(when, time[held], values[held]))
         place = np.clip(np.searchsorted(time, when + 1e-9, side="right") - 1, 0, len(time) - 1)
         return np.asarray(values[place])
 
@@ -231,7 +233,7 @@ class _Draw:
     def taken(self, item: Instrument) -> Mask:
         """Rows (M,) in which ``item`` gives a reading."""
         every = max(1, round(item.reading.period / self.instruments.period))
-        taken = np.arange(len(self.rows)) % every == 0
+        taken: Mask = np.arange(len(self.rows)) % every == 0
         if not item.dropout:
             return taken
         draw = self.source(1, list(CHANNELS).index(item.channels[0]))
@@ -253,7 +255,7 @@ class _Draw:
         flags = tuple(
             Flag("gap", "time", float(self.rows[a]), float(self.rows[b]), int(b - a - 1),
                  f"the logger stood still: {b - a - 1} rows are missing")
-            for a, b in zip(held[:-1], held[1:], strict=True) if b - a > 1
+            for a, b in pairwise(held) if b - a > 1
         )  # fmt: skip
         return kept, flags
 
@@ -267,14 +269,14 @@ class _Draw:
 
 
 def _origin(
-    swum: Swim, one: int, instruments: Instruments, seed: int, offsets: Mapping[str, float]
+    swum: Swim, one: int, instruments: Instruments, seed: int, offsets: Mapping[str, float], notes: Sequence[str]
 ) -> dict[str, Any]:  # fmt: skip
     """Provenance of a record: how it was made up, and the offsets and the current that were drawn."""
     s, model = swum.trial.setting, swum.model
     alive = np.isfinite(swum.channels["x"][one])
     felt = swum.current[one][alive]
     return provenance(
-        {"model": digest([model.craft, dict(model.constants.c.__dict__)], 16)},
+        {"model": digest([model.craft, vars(model.constants.c), model.options], 16)},
         synthetic=True,
         model_level=model.derivatives.level,
         environment=asdict(swum.environment),
@@ -283,7 +285,8 @@ def _origin(
         craft_number=one,
         parameters={name: float(values[one]) for name, values in swum.parameters.items()},
         trial={"name": swum.trial.name, "kind": swum.trial.kind, "loop": swum.trial.loop, "speed": s.speed,
-               "thrust": s.thrust, "current": list(swum.trial.current), "notes": list(s.notes), "marks": swum.marks},
+               "thrust": s.thrust, "current": list(swum.trial.current), "notes": [*s.notes, *notes],
+               "marks": list(swum.marks[:MARKS]), "legs": len(swum.trial.legs)},
         ended=ENDINGS[int(swum.ended[one])],
         drawn={"offsets": dict(offsets), "current_mean": felt.mean(axis=0).tolist(),
                "current_std": felt.std(axis=0).tolist()},
@@ -291,6 +294,8 @@ def _origin(
     )  # fmt: skip
 
 
+MARKS = 100
+"""Most ends of legs that the provenance lists."""
 ENDINGS = {
     0: "done", 1: "the motion was no longer finite", 2: "the speed ran away", 3: "an event did not come in its time",
     4: "stopped",
