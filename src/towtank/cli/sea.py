@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from towtank.field.sea_water import Environment
     from towtank.model.equations import Model
 
-MARK = "synthetic"
-"""Word that every name of such a file has."""
-
 
 class Format(StrEnum):
     """Formats on offer."""
@@ -41,11 +38,8 @@ class Format(StrEnum):
     IVER = "iver"
 
 
-ENDINGS = {
-    Format.NETCDF: ".nc", Format.CSV: ".csv", Format.MAT: ".mat", Format.ALOG: ".alog", Format.ROS1: ".bag",
-    Format.ROS2: "", Format.IMC: ".csv", Format.IVER: ".csv",
-}  # fmt: skip
-"""End of the name of a file of each format; a ROS 2 bag is a folder."""
+SPEEDY = (Format.ALOG, Format.IVER)
+"""Formats whose craft tell one speed and no velocities."""
 
 
 def _option(metavar: str, text: str) -> Any:
@@ -124,10 +118,14 @@ def sea(
     """
     with answering("sea", json, debug) as reply:
         from towtank.field.sea import swim
+        from towtank.field.sea_log import EXACT
         from towtank.field.sea_trials import trial_called
+        from towtank.field.writing import write_as
 
+        _check_name(out, format)
         when, where = _epoch(start), _datum(datum)
         measuring = _instruments(instruments)
+        measuring = replace(measuring, left_out=()) if format in SPEEDY else measuring
         water, lasting = _environment(current, shear, turbulence, seed), _lasting(eddies)
         chain = open_chain(reply, craft, None).keep_speed()
         reply.files.pop("study", None)
@@ -135,14 +133,10 @@ def sea(
         water = replace(water, correlation=lasting(chosen.ready.setting.speed))
         swum = swim(chosen.model, chosen.ready, water, progress=reply.progress)
         log = _observed(swum, chosen, measuring, seed, when, where)
-        path = _write(log, named(out, log, format), format)
-        reply.file("log", path)
+        reply.file("log", write_as(log, out or Path(f"{log.craft}-{log.name}"), format.value))
         if truth is not None:
-            from towtank.field.files import write_log
-            from towtank.field.sea_log import EXACT
-
             exact = _observed(swum, chosen, EXACT, seed, when, where)
-            reply.file("truth", write_log(exact, named(truth, exact, Format.NETCDF)))
+            reply.file("truth", write_as(exact, truth, Format.NETCDF.value))
         _tell(reply, swum, log, chosen)
 
 
@@ -272,20 +266,17 @@ def _observed(
     return observe(swum, instruments, seed, epoch=epoch, datum=datum, notes=chosen.notes)
 
 
-def named(out: Path | None, log: SeaLog, format: Format) -> Path:
-    """The file's name: as asked for, with ``-synthetic`` where it does not say so."""
-    path = Path(f"{log.craft}-{log.name}{ENDINGS[format]}") if out is None else out
-    return path if MARK in path.stem else path.with_name(f"{path.stem}-{MARK}{path.suffix}")
+def _check_name(out: Path | None, format: Format) -> None:
+    """Refuse a name with the ending of another format."""
+    from towtank.field.writing import FORMATS
 
-
-def _write(log: SeaLog, path: Path, format: Format) -> Path:
-    from towtank.field.files import write_log
-
-    if format is Format.NETCDF:
-        return write_log(log, path)
-    from towtank.field.writing import write_as
-
-    return write_as(log, path, format.value)
+    if out is None or (own := FORMATS[format.value][0]) == out.suffix or not out.suffix:
+        return
+    if out.suffix in {ending for ending, _ in FORMATS.values()}:
+        raise InputError(
+            f"--out {out} is no name of the format {format.value}, which ends in {own or 'nothing: it is a folder'}. "
+            "Change the name, or the format with --format."
+        )
 
 
 def _tell(reply: Reply, swum: Swim, log: SeaLog, chosen: SeaTrial) -> None:

@@ -116,18 +116,18 @@ def _check(trial: Ready, environment: Environment, count: int) -> None:
     waiting = [leg.name for leg in trial.legs if leg.until is not None]
     if count > 1 and waiting:
         raise InputError(
-            f"sea: leg {waiting[0]!r} of {trial.name} ends by an event, which comes to each of {count} craft at a time "
+            f"leg {waiting[0]!r} of {trial.name} ends by an event, which comes to each of {count} craft at a time "
             "of its own. Let one craft swim at a time, or give legs that end by time."
         )
     if trial.setting.pilot is not None and not trial.setting.pilot.sensors.exact:
         raise InputError(
-            "sea: the pilot's sensors have noise, which the engine draws anew in each piece of constant current; an "
+            "the pilot's sensors have noise, which the engine draws anew in each piece of constant current; an "
             "offset would not last. Give a pilot with exact sensors; the record gets its noise from the instruments."
         )
     water = np.linalg.norm(np.asarray(environment.current) + np.asarray(trial.current))
     if water >= trial.setting.speed:
         raise InputError(
-            f"sea: a mean current of {water:.3g} m/s is not below the craft's {trial.setting.speed:.3g} m/s; it cannot "
+            f"a mean current of {water:.3g} m/s is not below the craft's {trial.setting.speed:.3g} m/s; it cannot "
             "make way against it. Give a slower current or a faster trial."
         )
 

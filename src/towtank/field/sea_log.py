@@ -70,8 +70,9 @@ class Instrument:
 
 @dataclass(frozen=True)
 class Instruments:
-    """What writes a record, a row every ``period`` [s]; a channel without an instrument is exact in every row.
+    """What writes a record, a row every ``period`` [s].
 
+    A channel without an instrument is exact in every row; the speed without one is that of the velocities as read.
     jitter [s] : standard deviation of the time stamps, cut off at 0.4 periods.   outages [1/s] : how often the logger
     stands still for ``outage`` [s]; its rows are missing.   left_out : channels that are not recorded.   assumed :
     whether the numbers are assumed, not those of a product.
@@ -102,6 +103,10 @@ class Instruments:
                 f"instruments: period {self.period:g} s, jitter {self.jitter:g} s, outages {self.outages:g} 1/s of "
                 f"{self.outage:g} s. Give a period above zero, the others 0 or more."
             )
+
+    def has(self, channel: str) -> bool:
+        """Whether an instrument of its own gives ``channel``."""
+        return any(channel in item.channels for item in self.items)
 
     def of(self, channel: str) -> Instrument:
         """The instrument of ``channel``; an exact one when there is none."""
@@ -156,6 +161,8 @@ def observe(
     draw = _Draw(check_seed(seed), rows, instruments)
     names = [name for name in CHANNELS if name in swum.channels and name not in instruments.left_out]
     channels = {name: draw.measured(name, _truth(swum, one, name, instruments)(rows)) for name in names}
+    if "speed" in names and not instruments.has("speed"):
+        channels["speed"] = np.linalg.norm([channels[name] for name in ("u", "v", "w")], axis=0)
     kept, flags = draw.logged()
     stamps = draw.stamps()[kept]
     shape = {
@@ -178,13 +185,13 @@ def observe(
 def _rows(swum: Swim, instruments: Instruments, one: int) -> Array:
     """Times (M,) [s] of the rows."""
     if not 0 <= one < len(swum):
-        raise InputError(f"sea: craft {one} of {len(swum)}. Count from 0.")
+        raise InputError(f"craft {one} of {len(swum)}. Count from 0.")
     alive = np.flatnonzero(np.isfinite(swum.channels["x"][one]))
     last = float(swum.time[alive[-1]]) if len(alive) else 0.0
     count = int(np.floor(last / instruments.period + 1e-9)) + 1
     if count < 2:
         raise InputError(
-            f"sea: {swum.trial.name} lasted {last:.3g} s, less than two rows {instruments.period:g} s apart. Give a "
+            f"{swum.trial.name} lasted {last:.3g} s, less than two rows {instruments.period:g} s apart. Give a "
             "longer trial or a shorter period."
         )
     return np.asarray(instruments.period * np.arange(count))
