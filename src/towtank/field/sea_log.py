@@ -20,8 +20,8 @@ from towtank.provenance import digest, provenance
 
 Mask = NDArray[np.bool_]
 
-SMOOTH = (*MEASURED, *(f"delta{i + 1}" for i in range(FINS)), "thrust", "revolutions")
-"""Channels that pass through what lies between two control periods; the others are held."""
+SMOOTH = (*MEASURED, *(f"delta{i + 1}" for i in range(FINS)))
+"""Channels that go on a straight line between control periods; thrust, commands and orders are held."""
 LARGEST_JITTER = 0.4
 """A time stamp is off by at most this share of the period of the record, so that the order of the rows stays."""
 
@@ -150,7 +150,7 @@ def observe(
     that are kept in the provenance beside those of the trial.
 
     Reading k of an instrument is taken in the row nearest to k periods. It holds the truth ``latency`` ago, a straight
-    line between control periods; orders and commands are those that stand.
+    line between control periods; thrust, commands and orders are those that stand.
 
     Raises
     ------

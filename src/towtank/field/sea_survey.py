@@ -33,8 +33,9 @@ SHARE = (0.12, 0.10, 0.08)
 """Root mean square of the sines of rudder, elevator and aileron, as shares of the fins' limit."""
 BLOCK = 8.0
 """Lengths travelled in one block."""
-THROTTLES = (1.0, 0.64, 1.44, 0.81, 1.21)
-"""Thrust of the blocks as a multiple of that of the set speed: speeds of 0.8 to 1.2 of it."""
+THROTTLES = (1.0, 0.49, 1.96, 0.72, 1.44)
+"""Thrust of the blocks as a multiple of that of the set speed. Steady speeds would be 0.7 to 1.4 of it; a block ends
+before the craft is there."""
 MANOEUVRES = ("weave", "turn to starboard", "depth step", "turn to port", "sines alone")
 DEEP = 3.0
 """Lengths below the surface at the start."""
