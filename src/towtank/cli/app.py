@@ -15,6 +15,7 @@ from towtank.cli.doctor import doctor
 from towtank.cli.faults import faults
 from towtank.cli.grid import grid
 from towtank.cli.imports import import_
+from towtank.cli.log import log
 from towtank.cli.mc import mc
 from towtank.cli.new import new
 from towtank.cli.pilot import pilot
@@ -78,6 +79,7 @@ for _command in (
     sweep,
     design,
     report,
+    log,
     doctor,
 ):
     app.command(_command.__name__.strip("_").replace("_", "-"))(_command)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from towtank.errors import InputError
+from towtank.field.reading.note import says_so
 from towtank.field.reading.raw import Fault, Group, Raw, table_of
 from towtank.field.reading.text import text_lines
 
@@ -42,13 +43,15 @@ def read_alog(path: Path) -> Raw:
         if line.startswith("%"):
             if found := _START.match(line):
                 start = _float(found["at"])
+            if says_so(line.lstrip("% ")):
+                note = {"synthetic": True, **note}
             continue
         found = _LINE.match(line.strip())
         at = _float(found["at"]) if found else None
         if found is None or at is None:
             lost.append(number)
         elif found["name"] == NOTE:
-            note = _note(found["value"])
+            note |= _note(found["value"])
         else:
             postings[found["name"]].append((at, found["value"].strip(), number))
     count = sum(len(rows) for rows in postings.values())
@@ -60,7 +63,13 @@ def read_alog(path: Path) -> Raw:
     if lost:
         shown = ", ".join(str(i) for i in lost[:4]) + (" ..." if len(lost) > 4 else "")
         faults = (*faults, Fault(len(lost), f"line{'s' if len(lost) > 1 else ''} {shown}: no posting, left out"))
-    return Raw(path.name, {name: _group(path.name, name, rows) for name, rows in postings.items()}, start, note, faults)
+    return Raw(
+        path.name,
+        {name: _group(f"{path.name} {name}", name, rows) for name, rows in postings.items()},
+        start,
+        note,
+        faults,
+    )
 
 
 def _group(title: str, name: str, rows: list[tuple[float, str, int]]) -> Group:
@@ -69,7 +78,9 @@ def _group(title: str, name: str, rows: list[tuple[float, str, int]]) -> Group:
     spoilt = {}
     if np.isnan(columns[name]).any():
         texts[name] = tuple(value for _, value, _ in rows)
-        bad = sum(np.isnan(x) and v.lower() not in ("nan", "") for x, (_, v, _) in zip(columns[name], rows, strict=True))
+        bad = sum(
+            np.isnan(x) and v.lower() not in ("nan", "") for x, (_, v, _) in zip(columns[name], rows, strict=True)
+        )
         if bad:
             spoilt[name] = int(bad)
         for i, (_, value, _) in enumerate(rows):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from towtank.errors import InputError
@@ -79,7 +81,7 @@ def _attitude(columns: Columns, out: Columns, body: Array, world: Array, said: l
     _put(out, world @ rotation(angles) @ body.T, np.isfinite(angles).all(axis=-1))
 
 
-def _put(out: Columns, cosines: Array, known: Array) -> None:
+def _put(out: Columns, cosines: Array, known: Any) -> None:
     angles = np.full((len(cosines), 3), np.nan)
     kept = np.asarray(known, dtype=bool)
     if kept.any():

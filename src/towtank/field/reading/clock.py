@@ -184,7 +184,7 @@ def ordered(time: Array, clock: Clock, where: str) -> Order:
     Raises
     ------
     InputError
-        Fewer than two samples in order, or half of them out of it.
+        No sample with a time, or half of them out of order.
     """
     kept = np.flatnonzero(np.isfinite(time))
     flags: list[Flag] = []
@@ -199,7 +199,9 @@ def ordered(time: Array, clock: Clock, where: str) -> Order:
     twice[1:] = time[kept][1:] == time[kept][:-1]
     if twice.any():
         at = time[kept[twice]]
-        flags.append(_flag("repeat", at, f"{where}: {int(twice.sum())} samples with the time of the one before: kept out"))
+        flags.append(
+            _flag("repeat", at, f"{where}: {int(twice.sum())} samples with the time of the one before: kept out")
+        )
         kept = kept[~twice]
     rising = _longest(time[kept])
     if len(rising) < len(kept):
@@ -208,12 +210,12 @@ def ordered(time: Array, clock: Clock, where: str) -> Order:
         flags.append(_flag("clock", time[kept[out]], words))
         if len(out) > OUT_OF_ORDER * len(kept):
             raise InputError(
-                f"{where}: {len(out)} of {len(kept)} samples are out of order of time. Is another column the clock? For "
-                'a clock that starts again write [clock] reset = "continue", or cut the file into one log for each.'
+                f"{where}: {len(out)} of {len(kept)} samples are out of order of time. Is another column the clock? "
+                'For a clock that starts again write [clock] reset = "continue", or cut the file into one log for each.'
             )
         kept = kept[rising]
-    if len(kept) < 2:
-        raise InputError(f"{where}: {len(kept)} samples with a time; two or more make a log.")
+    if not len(kept):
+        raise InputError(f"{where}: no sample has a time. Correct [clock], or export the log again.")
     return Order(kept, time[kept], (*flags, *_gaps(time[kept], where)), tuple(said))
 
 
@@ -223,7 +225,7 @@ def _flag(kind: str, at: Array, words: str) -> Flag:
 
 def _gaps(time: Array, where: str) -> list[Flag]:
     steps = np.diff(time)
-    usual = float(np.median(steps))
+    usual = float(np.median(steps)) if len(steps) else 0.0
     out = []
     for i in np.flatnonzero(steps > GAP * usual):
         missing = max(round(float(steps[i]) / usual) - 1, 1)

@@ -1,5 +1,4 @@
-"""Channels of a record that are made from others: places from latitude and longitude, depth from pressure, true heading
-from magnetic, angles without jumps."""
+"""Channels made from others: places from latitude and longitude, depth from pressure, true from magnetic heading."""
 
 from __future__ import annotations
 
@@ -70,7 +69,7 @@ def _beside(time: Array, order: Array, psi: Array) -> Array:
     if not len(at) or not len(known):
         return order
     there = psi[known[np.argmin(np.abs(time[known] - time[at[0]]))]]
-    return order - 2.0 * np.pi * np.round((order[at[0]] - there) / (2.0 * np.pi))
+    return np.asarray(order - 2.0 * np.pi * np.round((order[at[0]] - there) / (2.0 * np.pi)))
 
 
 def _depth(pressure: Array, mapping: LogMap, said: list[str]) -> Array:
@@ -82,7 +81,7 @@ def _depth(pressure: Array, mapping: LogMap, said: list[str]) -> Array:
         f"z from pressure: {surface:.6g} Pa at the surface, water of {density:.5g} kg/m3"
         + (f" (assumed: {', '.join(assumed)})" if assumed else "")
     )
-    return (pressure - surface) / (density * GRAVITY)
+    return np.asarray((pressure - surface) / (density * GRAVITY))
 
 
 def _placed(
@@ -102,8 +101,8 @@ def _placed(
     first = datum or (float(latitude[known[0]]), float(longitude[known[0]]))
     north, east = north_east(latitude, longitude, first)
     said.append(
-        f"latitude and longitude to metres north and east of {np.degrees(first[0]):.7f}, {np.degrees(first[1]):.7f} deg "
-        f"({'stated' if datum else 'the first fix'})"
+        f"latitude and longitude to metres north and east of {np.degrees(first[0]):.7f}, "
+        f"{np.degrees(first[1]):.7f} deg ({'stated' if datum else 'the first fix'})"
     )
     both = "x" in out or "y" in out
     if both and not mapping.offsets:

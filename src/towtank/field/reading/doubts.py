@@ -13,10 +13,10 @@ from towtank.frames import Array
 
 HALF_WINDOW = 5
 """Neighbours on each side that a value is compared with."""
+SCALE_HALF = 25
+"""Neighbours on each side from which the scale of the deviations is taken."""
 SIGMAS = 6.0
-"""Robust standard deviations from the median of its neighbours beyond which a value is an outlier. In Gaussian noise
-one sample in 5e8 is beyond 6; the scale of 11 neighbours is itself uncertain, so that one in 1e4 was found (judgement:
-a flag costs nothing)."""
+"""Robust standard deviations from its neighbours beyond which a value is an outlier: one in 5e8 of Gaussian noise."""
 MAD = 1.4826
 """Median absolute deviation to the standard deviation of Gaussian noise."""
 FEW = 3 * (2 * HALF_WINDOW + 1)
@@ -38,7 +38,9 @@ _TESTED = (*MEASURED, "delta1", "delta2", "delta3", "delta4")
 Mask = NDArray[np.bool_]
 
 
-def doubts_of(time: Array, channels: Mapping[str, Array], limits: Mapping[str, tuple[float, float]]) -> tuple[Flag, ...]:
+def doubts_of(
+    time: Array, channels: Mapping[str, Array], limits: Mapping[str, tuple[float, float]]
+) -> tuple[Flag, ...]:
     """Flags on the values of ``channels`` (N,) [SI]; ``limits`` [SI] come before those of any craft."""
     flags: list[Flag] = []
     for name, column in channels.items():
@@ -65,21 +67,26 @@ def doubts_of(time: Array, channels: Mapping[str, Array], limits: Mapping[str, t
 def outliers(values: Array) -> Mask:
     """Which of ``values`` (N,) are far from their neighbours.
 
-    Source     hampel1974; pearson2002: the median of a moving window and the median absolute deviation from it.
-    Departure  The scale is not below the noise of the whole row, from its second differences (the Hampel filter flags
-               every change of a channel that stands still otherwise), nor below its smallest step.
-    Valid      ``FEW`` samples or more; motions slower than the window of 11 samples.
+    Source     hampel1974; pearson2002: the median of a moving window, and the median absolute deviation as scale.
+    Departure  Two medians must be missed: that of the window, which a step does not miss, and that of the means of the
+               pairs at equal distances before and after, which a straight motion does not miss. The scale is that of
+               the second in a window of 51 samples, and not below the noise of the whole row, from its second
+               differences, nor below its smallest step.
+    Valid      ``FEW`` samples or more; motions of more than 20 samples a period.
     """
     padded = np.pad(values, HALF_WINDOW, mode="reflect", reflect_type="odd")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_WINDOW + 1)
-    middle = np.median(windows, axis=-1)
-    spread = MAD * np.median(np.abs(windows - middle[:, None]), axis=-1)
+    pairs = 0.5 * (windows[:, :HALF_WINDOW] + windows[:, : -HALF_WINDOW - 1 : -1])
+    off = np.abs(values - np.median(pairs, axis=-1))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(off, SCALE_HALF, mode="reflect"), 2 * SCALE_HALF + 1)
     # The second difference of white noise has six times its variance.
     noise = MAD * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0)
     steps = np.abs(np.diff(values))
     smallest = float(steps[steps > 0.0].min()) if (steps > 0.0).any() else 0.0
-    scale = np.maximum(spread, max(noise, smallest))
-    return np.asarray(np.abs(values - middle) > SIGMAS * scale) & (scale > 0.0)
+    floor = max(noise, smallest)
+    scale = np.maximum(MAD * np.median(around, axis=-1), floor)
+    far = np.abs(values - np.median(windows, axis=-1)) > SIGMAS * floor
+    return np.asarray(far & (off > SIGMAS * scale) & (scale > 0.0))
 
 
 def _still(name: str, time: Array, values: Array) -> list[Flag]:
@@ -100,7 +107,9 @@ def _still(name: str, time: Array, values: Array) -> list[Flag]:
     often = float(np.median(lengths[~stuck])) if (~stuck).any() else 1.0
     if often >= 2.0:
         again = int((lengths[~stuck] - 1).sum())
-        words = f"each value of {name} stands {often:g} times: the sensor is slower than the log, {again} samples are no "
+        words = (
+            f"each value of {name} stands {often:g} times: the sensor is slower than the log, {again} samples are no "
+        )
         out.append(Flag("repeat", name, float(time[0]), float(time[-1]), again, words + "new ones (held = true)"))
     return out
 

@@ -7,7 +7,7 @@ adds a sentence to ``SeaLog.conversions``; what is doubtful goes into ``flags``.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +15,6 @@ import numpy as np
 
 from towtank.craft.craft import Craft
 from towtank.errors import InputError
-from towtank.field.files import read_log
 from towtank.field.log import CHANNELS, Flag, SeaLog
 from towtank.field.reading.axes import turned
 from towtank.field.reading.clock import Order, ordered, times_of
@@ -23,10 +22,10 @@ from towtank.field.reading.derived import finished_angles, made
 from towtank.field.reading.doubts import doubts_of
 from towtank.field.reading.levers import sensors_of, to_origin
 from towtank.field.reading.mapping import GIVEN, Channel, LogMap
-from towtank.field.reading.merging import merged
+from towtank.field.reading.merging import merged, stood
 from towtank.field.reading.note import MARK, numbers
 from towtank.field.reading.opening import Opened, clock_of, lane_of, opened
-from towtank.field.reading.raw import Group, Raw
+from towtank.field.reading.raw import Group, Raw, Rows
 from towtank.field.reading.values import Series, column_in_si, held_out, rows_where
 from towtank.frames import Array
 from towtank.provenance import provenance
@@ -58,17 +57,48 @@ def read_sea_log(
     said: list[str] = list(found.said)
     series, flags, absolute, zero = _series(found, said)
     time, columns = merged(series, found.mapping.clock, said)
+    columns = _held(found, columns, said)
     first = float(time[0])
     columns, datum = made(columns, found.mapping, _datum(found), said)
+    if found.mapping.datum is None and found.raw.note.get("datum", datum) is None:
+        datum = None
     columns = turned(columns, found.mapping.axes, said)
     columns = finished_angles(time, columns, found.mapping, said)
     columns, lost = _finished(time, columns, found, said)
-    flags = (*flags, *lost, *_all_faults(found.raw, time))
-    limits = {key: _limits(key, channel) for key, channel in found.channels.items() if channel.limits and key in columns}
+    flags = (*_joined(flags), *lost, *_all_faults(found.raw, time))
+    limits = {
+        key: _limits(key, channel) for key, channel in found.channels.items() if channel.limits and key in columns
+    }
     flags = (*flags, *doubts_of(time, columns, limits))
     if not columns:
         raise InputError(f"{path}: nothing of a record is mapped. Name columns in [channels].")
-    return _log(path, found, time - first, columns, _epoch(found, absolute, zero, first), datum, _moved(flags, first), said)
+    return _log(
+        path, found, time - first, columns, _epoch(found, absolute, zero, first), datum, _moved(flags, first), said
+    )
+
+
+def _held(found: Opened, columns: dict[str, Array], said: list[str]) -> dict[str, Array]:
+    """Values that stand until the next one; in a log of towtank's own each is written at each instant."""
+    names = [
+        key
+        for key, channel in found.channels.items()
+        if channel.hold and key in columns and "towtank" not in found.raw.note
+    ]
+    if names:
+        said.append(f"{', '.join(names)}: a value stands until the next one")
+    return {key: stood(values) if key in names else values for key, values in columns.items()}
+
+
+def _joined(flags: Sequence[Flag]) -> tuple[Flag, ...]:
+    """Flags of several tables on the same span as one."""
+    same: dict[tuple[str, str, float, float, int], list[Flag]] = {}
+    for flag in flags:
+        key = (flag.kind, flag.channel, round(flag.start, 6), round(flag.end, 6), flag.count)
+        same.setdefault(key, []).append(flag)
+    return tuple(
+        replace(some[0], words=some[0].words + (f" (and {len(some) - 1} more tables)" if len(some) > 1 else ""))
+        for some in same.values()
+    )
 
 
 @dataclass(frozen=True)
@@ -77,7 +107,7 @@ class _Lane:
 
     group: Group
     order: Order
-    rows: Array
+    rows: Rows
 
 
 def _series(found: Opened, said: list[str]) -> tuple[dict[str, Series], tuple[Flag, ...], bool, float]:
@@ -98,7 +128,8 @@ def _series(found: Opened, said: list[str]) -> tuple[dict[str, Series], tuple[Fl
         absolute = absolute or counted
         order = ordered(times[rows], found.mapping.clock, group.table.title)
         lanes[key], raw_times[key] = _Lane(group, order, rows), order.time
-        flags += order.flags
+        # What is given only when it changes has no rate that a hole could be seen by.
+        flags += [flag for flag in order.flags if not (channel.hold and flag.kind == "gap")]
     if not lanes:
         raise InputError(f"{found.raw.title}: no sample of any channel. Correct where = in [channels].")
     zero = float(np.floor(min(float(times[0]) for times in raw_times.values()))) if absolute else 0.0
@@ -151,8 +182,8 @@ def _finished(
 def _own_fins(columns: dict[str, Array], craft: Craft | None, said: list[str]) -> dict[str, Array]:
     if craft is None:
         raise InputError(
-            'fins = "vehicle": the sense of each fin is in the craft file. Name the craft, or write fins = "towtank" for '
-            "angles that are right-handed about the outward span."
+            'fins = "vehicle": the sense of each fin is in the craft file. Name the craft, or write fins = "towtank" '
+            "for angles that are right-handed about the outward span."
         )
     out = dict(columns)
     turned_round = []

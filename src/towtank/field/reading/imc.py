@@ -12,6 +12,7 @@ from typing import Any
 
 from towtank.errors import InputError
 from towtank.field.reading.mapping import Text
+from towtank.field.reading.note import says_so
 from towtank.field.reading.raw import Fault, Group, Raw
 from towtank.field.reading.text import read_delimited_log, table_of_lines, text_lines
 
@@ -55,12 +56,15 @@ def _message(path: Path) -> Raw:
 def _note(path: Path | None) -> dict[str, Any]:
     if path is None:
         return {}
+    note: dict[str, Any] = {}
     for _, line in text_lines(path)[0]:
+        if any(says_so(cell) for cell in line.split(", ")):
+            note["synthetic"] = True
         _, brace, rest = line.partition('{"towtank"')
         if brace:
             try:
                 found = json.loads(brace + rest)
             except ValueError:
                 continue
-            return found if isinstance(found, dict) else {}
-    return {}
+            note |= found if isinstance(found, dict) else {}
+    return note

@@ -107,7 +107,9 @@ def _position(
             unknown |= ~known
     arm = (rotation(angles) @ r)[:, axis]
     _say(name, r, [f"{angle} (taken as zero)" for angle in lacking], said)
-    return _without(time, columns[name], columns[name] - np.where(unknown, np.nan, arm), name, "attitude", unknown, flags)
+    return _without(
+        time, columns[name], columns[name] - np.where(unknown, np.nan, arm), name, "attitude", unknown, flags
+    )
 
 
 def _say(name: str, r: Array, lacking: list[str], said: list[str]) -> None:
@@ -127,9 +129,7 @@ def _without(
     return after
 
 
-def sensors_of(
-    channels: Mapping[str, Channel], sensors: Mapping[str, Sensor], craft: Craft | None
-) -> dict[str, Array]:
+def sensors_of(channels: Mapping[str, Channel], sensors: Mapping[str, Sensor], craft: Craft | None) -> dict[str, Array]:
     """Channel -> place (3,) of its sensor; those of latitude and longitude stand for x and y, of pressure for z."""
     out = {}
     for key, channel in channels.items():

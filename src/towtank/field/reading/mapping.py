@@ -57,10 +57,12 @@ class Channel(Clause):
     """Where a channel stands and how its numbers are read.
 
     column : its name; "TOPIC:field" where a file has several tables.   unit : where the file does not say it.
-    counts, points : of raw counts; two or more points (raw, value).   factor, offset : value = factor * number + offset.
+    counts, points : of raw counts; two or more points (raw, value).
+    factor, offset : value = factor * number + offset.
     missing : numbers that stand for nothing measured.   where : only rows in which other columns hold these values.
     sensor : of ``sensors``, whose place the channel belongs to.   magnetic : from magnetic north.
-    held : a value that repeats the last one was not measured anew.   time : a clock column of its own.
+    held : a value that repeats the last one was not measured anew.   hold : a value stands until the next one.
+    time : a clock column of its own.
     std, bias, assumed : of the noise.   limits : what it can be.   optional : may be absent.
     """
 
@@ -75,6 +77,7 @@ class Channel(Clause):
     sensor: str = ""
     magnetic: bool = False
     held: bool = False
+    hold: bool = False
     time: str = ""
     std: Number | None = None
     bias: Number | None = None
@@ -100,7 +103,7 @@ class Clock(Clause):
     utc_offset: Number = 0.0
     leap_seconds: int = 18
     reset: Literal["keep out", "continue"] = "keep out"
-    within: Number = 1e-3
+    within: Number = 1e-4
     step: Number | None = None
 
 

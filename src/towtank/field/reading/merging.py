@@ -20,8 +20,8 @@ LARGEST = 5_000_000
 def merged(series: Mapping[str, Series], clock: Clock, said: list[str]) -> tuple[Array, dict[str, Array]]:
     """Times (N,) [s] of every sample of any channel, and channel -> values (N,), NaN where it was not measured.
 
-    Stamps of different channels closer than ``clock.within`` are one instant. With ``clock.step`` the samples are put on
-    uniform ticks, each on the nearest.
+    Stamps of different channels closer than ``clock.within`` are one instant. With ``clock.step`` the samples are put
+    on uniform ticks, each on the nearest.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def merged(series: Mapping[str, Series], clock: Clock, said: list[str]) -> tuple
     if len(tables) == 1:
         base = every
     else:
-        finest = min(float(np.diff(time).min()) for time in tables if len(time) > 1)
+        finest = min((float(np.diff(time).min()) for time in tables if len(time) > 1), default=np.inf)
         within = min(si(clock.within, "s", "clock, within"), 0.49 * finest / len(tables))
         base = every[np.diff(every, prepend=-np.inf) > within]
     _refuse(len(base))
@@ -62,19 +62,27 @@ def _on_ticks(
     first, last = min(float(t[0]) for t in tables), max(float(t[-1]) for t in tables)
     count = round((last - first) / step) + 1
     _refuse(count)
-    base = first + step * np.arange(count)
+    base: Array = first + step * np.arange(count, dtype=float)
     out = {name: nearest(one.time, one.values, base, step) for name, one in series.items()}
     lost = {name: len(one.values) - int(np.isfinite(out[name]).sum()) for name, one in series.items()}
     words = ", ".join(f"{count} of {name}" for name, count in lost.items() if count)
     said.append(
-        f"samples put on ticks of {step:g} s, each on the nearest" + (f"; left out where two fell on one: {words}" * bool(words))
+        f"samples put on ticks of {step:g} s, each on the nearest"
+        + (f"; left out where two fell on one: {words}" * bool(words))
     )
     return base, out
+
+
+def stood(values: Array) -> Array:
+    """Values (N,) that stand until the next one."""
+    known = np.isfinite(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
 
 
 def _refuse(count: int) -> None:
     if count > LARGEST:
         raise InputError(
-            f"clock: the log comes to {count} samples, more than {LARGEST}. One wrong stamp can do that; or cut the log, "
-            'or write [clock] step = "0.1 s".'
+            f"clock: the log comes to {count} samples, more than {LARGEST}. One wrong stamp can do that; or cut the "
+            'log, or write [clock] step = "0.1 s".'
         )

@@ -1,5 +1,4 @@
-"""What towtank says of its own logs inside files of other formats: craft, zero of time, noise, and that they are made
-up."""
+"""What towtank says of its own logs inside files of other formats: craft, zero of time, noise, and if made up."""
 
 from __future__ import annotations
 
@@ -12,6 +11,11 @@ from towtank.field.log import CHANNELS, SeaLog
 MARK = "-synthetic"
 """End of the name of a file that holds a record made up."""
 WORDS = "SYNTHETIC: made up by towtank, no record of a craft at sea"
+
+
+def says_so(text: str) -> bool:
+    """Whether a comment or a text says that the log is made up."""
+    return text.strip().startswith(WORDS.partition(":")[0])
 
 
 def note_of(log: SeaLog) -> dict[str, Any]:

@@ -92,7 +92,7 @@ def _known(path: Path) -> tuple[str, str]:
     if form == "netcdf":
         return ("own", "") if _is_own(path) else (form, "")
     if form == "mat":
-        return form, "towtank" if mat_note(path) else ""
+        return form, "towtank" if "towtank" in mat_note(path) else ""
     if form == "ros":
         return form, "ros" if any(topic.startswith("/towtank/") for topic in topics_of(path)) else ""
     if form == "alog":

@@ -47,8 +47,8 @@ def read_ros(path: Path, wanted: Mapping[str, Sequence[str]], sparse: bool) -> R
         raise
     except Exception as error:  # rosbags, sqlite3 and struct raise many kinds on damaged files
         raise InputError(
-            f"{path} is not a whole bag ({str(error).rstrip('.') or type(error).__name__}). Reindex it with the tools of "
-            "ROS (rosbag reindex, ros2 bag reindex), or give the folder that holds metadata.yaml."
+            f"{path} is not a whole bag ({str(error).rstrip('.') or type(error).__name__}). Reindex it with the tools "
+            "of ROS (rosbag reindex, ros2 bag reindex), or give the folder that holds metadata.yaml."
         ) from None
 
 
@@ -105,7 +105,9 @@ def _raw(
             continue
         gone = [field for field in wanted[topic] if field in absent[topic]]
         if gone and not sparse:
-            raise InputError(f"{path.name}, {topic}: its messages have no field {', '.join(gone)}. Correct the mapping.")
+            raise InputError(
+                f"{path.name}, {topic}: its messages have no field {', '.join(gone)}. Correct the mapping."
+            )
         names = tuple(field for field in wanted[topic] if field not in absent[topic])
         values = np.array([row for _, row in found], dtype=float).reshape(len(found), -1)
         kept = values[:, [wanted[topic].index(name) for name in names]]
@@ -122,7 +124,7 @@ def _stamp(message: Any, at: int) -> int:
 
 
 def _field(message: Any, path: str, absent: set[str]) -> float:
-    """Number at ``path`` of a message, NaN where it is none; paths that the message does not have go into ``absent``."""
+    """Number at ``path`` of a message, NaN where it is none; paths that it does not have go into ``absent``."""
     value = message
     for step in path.split("."):
         found = _STEP.match(step)

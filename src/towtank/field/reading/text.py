@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 from collections import Counter
@@ -13,6 +14,7 @@ import numpy as np
 
 from towtank.errors import InputError
 from towtank.field.reading.mapping import Text
+from towtank.field.reading.note import says_so
 from towtank.field.reading.raw import Fault, Group, Raw
 from towtank.frames import Array
 from towtank.tank.imported.delimited import COMMENTS
@@ -27,6 +29,8 @@ SPOILT_LINES = 0.5
 CONTROL = 0.01
 """Share of control characters above which a file is taken for no text; damaged blocks of a log stay below it."""
 _CONTROLS = frozenset(chr(code) for code in (*range(9), 11, 12, *range(14, 32)))
+STATE = "Error State"
+"""Column of an Iver log, which has no comments, that says whether it is made up."""
 Lines = list[tuple[int, str]]
 
 
@@ -41,6 +45,8 @@ def read_delimited_log(path: Path, text: Text) -> Raw:
     kept, faults = text_lines(path)
     note = _note(kept)
     group, spoilt = table_of_lines(path.name, kept, text)
+    if any(says_so(cell) for cell in group.texts.get(STATE, ())[:1]):
+        note = {"synthetic": True, **note}
     return Raw(path.name, {"": group}, None, note, (*faults, *spoilt))
 
 
@@ -67,8 +73,10 @@ def text_lines(path: Path) -> tuple[Lines, tuple[Fault, ...]]:
     if not clean:
         raise InputError(f"{path} holds no line of text. It is damaged, or of another format.")
     lost = [i for i, line in lines if _CONTROLS & set(line) or (odd and line.count("\ufffd") > 4)]
-    said = (Fault(len(lost), f"{_places(lost)} not text: left out"),) if lost else ()
-    return clean, said
+    said = [Fault(len(lost), f"{_places(lost)} not text: left out")] if lost else []
+    if not found.endswith(("\n", "\r")):
+        said.append(Fault(1, f"line {lines[-1][0]}, the last, has no end: it may be cut off"))
+    return clean, tuple(said)
 
 
 def _mostly_text(found: str) -> bool:
@@ -80,15 +88,18 @@ def _mostly_text(found: str) -> bool:
 
 def _note(lines: Lines) -> Mapping[str, Any]:
     """What towtank wrote of its own file in a comment."""
+    note: dict[str, Any] = {}
     for _, line in lines[:40]:
-        bare = line.strip().strip('"').lstrip("#%/ ").strip()
+        if not line.lstrip().startswith(COMMENTS):
+            continue
+        bare = line.strip().lstrip("#%/ ").strip()
+        if says_so(bare):
+            note["synthetic"] = True
         if bare.startswith(NOTE):
-            try:
+            with contextlib.suppress(ValueError):
                 found = json.loads(bare.removeprefix(NOTE))
-            except ValueError:
-                continue
-            return found if isinstance(found, dict) else {}
-    return {}
+                note |= found if isinstance(found, dict) else {}
+    return note
 
 
 def table_of_lines(title: str, lines: Lines, text: Text) -> tuple[Group, tuple[Fault, ...]]:
@@ -160,10 +171,9 @@ def _group(title: str, headers: list[str], rows: list[list[str]], numbers: list[
 
 def _numbers(cells: Sequence[str], decimal: bool) -> tuple[Array, int]:
     """Cells as numbers, NaN where a cell holds none; and how many of those hold something else."""
-    try:
-        return np.where(np.isfinite(found := np.array(cells, dtype=float)), found, np.nan), 0
-    except ValueError:
-        pass
+    with contextlib.suppress(ValueError):
+        found = np.array(cells, dtype=float)
+        return np.where(np.isfinite(found), found, np.nan), 0
     values, bad = np.full(len(cells), np.nan), 0
     for i, cell in enumerate(cells):
         if cell.lower() in MISSING:

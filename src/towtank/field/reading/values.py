@@ -74,7 +74,9 @@ def _calibrated(
         counts = channel.counts
         if counts.per_unit == 0.0:
             raise InputError(f"channels.{key}.counts: per_unit is zero. State the counts of one {counts.unit}.")
-        said.append(f"{key} from counts: ({group.table.names[place]} - {counts.zero:g}) / {counts.per_unit:g} {counts.unit}")
+        said.append(
+            f"{key} from counts: ({group.table.names[place]} - {counts.zero:g}) / {counts.per_unit:g} {counts.unit}"
+        )
         return (raw - counts.zero) / counts.per_unit * _unit(counts.unit, unit, f"channels.{key}.counts.unit")
     if channel.points is not None:
         points = sorted((x, si(y, _spelt(unit), f"channels.{key}.points")) for x, y in channel.points)

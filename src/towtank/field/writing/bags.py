@@ -102,7 +102,9 @@ def _messages(log: SeaLog, t: Any) -> Sent:
     for i in np.flatnonzero(np.isfinite(water).any(axis=-1)):
         twist = _twist(t, np.concatenate([water[i], np.zeros(3)]))
         kind = "geometry_msgs/msg/TwistStamped"
-        sent.append((stamps[i], "/towtank/through_water", kind, t[kind](header=_header(t, stamps[i], "body"), twist=twist)))
+        sent.append(
+            (stamps[i], "/towtank/through_water", kind, t[kind](header=_header(t, stamps[i], "body"), twist=twist))
+        )
     for word, topic in (("delta", "/towtank/fins"), ("command", "/towtank/fins_asked")):
         angles = np.stack([log[f"{word}{k + 1}"] for k in range(FINS)], axis=-1)
         for i in np.flatnonzero(np.isfinite(angles).any(axis=-1)):

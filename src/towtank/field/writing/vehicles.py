@@ -21,6 +21,8 @@ from towtank.frames import Array
 
 _DEG = 180.0 / np.pi
 KNOT = 1852.0 / 3600.0
+NOWHERE = (np.pi / 6.0, -np.pi / 6.0)
+"""Datum of an Iver log of a record without one: 30 deg north, 30 deg west."""
 _MOOS: Mapping[str, tuple[str, float]] = {
     "x": ("NAV_Y", 1.0), "y": ("NAV_X", 1.0), "z": ("NAV_DEPTH", 1.0), "psi": ("NAV_HEADING", _DEG),
     "speed": ("NAV_SPEED", 1.0), "heading_order": ("DESIRED_HEADING", _DEG), "depth_order": ("DESIRED_DEPTH", 1.0),
@@ -95,10 +97,12 @@ def write_imc(log: SeaLog, path: Path) -> Path:
         files["EstimatedState"] = state
     water = [log[name] for name in ("ahead", "slip", "plunge")]
     if any(np.isfinite(values).any() for values in water):
-        fields = (("validity", ""), ("x", "m/s"), ("y", "m/s"), ("z", "m/s"))
+        water_fields = (("validity", ""), ("x", "m/s"), ("y", "m/s"), ("z", "m/s"))
         cells = [f"{x!r}, {y!r}, {z!r}" for x, y, z in zip(*(v.tolist() for v in water), strict=True)]
         known = np.any(np.isfinite(water), axis=0)
-        files["WaterVelocity"] = _message(log, fields, ((i, f"VALID, {cells[i]}") for i in np.flatnonzero(known)))
+        files["WaterVelocity"] = _message(
+            log, water_fields, [(int(i), f"VALID, {cells[i]}") for i in np.flatnonzero(known)]
+        )
     for message, word in (("ServoPosition", "delta"), ("SetServoPosition", "command")):
         rows = [
             (int(i), f"{fin}, {log[f'{word}{fin + 1}'][i].item()!r}")
@@ -115,7 +119,9 @@ def write_imc(log: SeaLog, path: Path) -> Path:
     return _folder(path, {f"{name}.csv": text for name, text in files.items()})
 
 
-def _message(log: SeaLog, fields: Sequence[tuple[str, str]], rows: Iterator[tuple[int, str]] | list[tuple[int, str]]) -> str:
+def _message(
+    log: SeaLog, fields: Sequence[tuple[str, str]], rows: Iterator[tuple[int, str]] | list[tuple[int, str]]
+) -> str:
     named = [f"{name} ({unit})" if unit else name for name, unit in fields]
     head = ", ".join(["timestamp (seconds since 01/01/1970)", "system", "entity ", *named])
     start, source = log.epoch or 0.0, log.craft or "craft"
@@ -132,7 +138,16 @@ def _estimated(log: SeaLog) -> str:
     """EstimatedState: NaN where nothing was measured; empty when nothing of it ever was."""
     latitude, longitude = log.datum or (0.0, 0.0)
     same = {"depth": "z"}
-    unset = {"lat": latitude, "lon": longitude, "height": 0.0, "z": 0.0, "vx": np.nan, "vy": np.nan, "vz": np.nan, "alt": np.nan}
+    unset = {
+        "lat": latitude,
+        "lon": longitude,
+        "height": 0.0,
+        "z": 0.0,
+        "vx": np.nan,
+        "vy": np.nan,
+        "vz": np.nan,
+        "alt": np.nan,
+    }
     columns: list[Array] = []
     for name, _ in _STATE:
         fixed = name in unset
@@ -189,8 +204,8 @@ def _wrote(path: Path, own: str) -> bool:
 def write_iver(log: SeaLog, path: Path) -> Path:
     """A record as a log of Iver and EcoMapper: one row for each sample, cells between semicolons.
 
-    Held: place, depth, attitude, speed, and orders of heading, depth and speed. Times are to 0.01 s, angles to 0.01 deg,
-    depth and speed to 0.001 m and knot, places to 1e-7 deg; columns of what a record does not hold are 0.
+    Held: place, depth, attitude, speed, and orders of heading, depth and speed. Times are to 0.01 s, angles to
+    0.01 deg, depth and speed to 0.001 m and knot, places to 1e-7 deg; columns of what a record does not hold are 0.
 
     Raises
     ------
@@ -204,19 +219,21 @@ def write_iver(log: SeaLog, path: Path) -> Path:
         raise InputError(f"log {log.name}: samples closer than the 0.01 s of an Iver log. Write another format.")
     cells: dict[str, list[str]] = {}
     if log.has("x", "y"):
-        latitude, longitude = latitude_longitude(log["x"], log["y"], log.datum or (0.0, 0.0))
+        latitude, longitude = latitude_longitude(log["x"], log["y"], log.datum or NOWHERE)
         cells["Latitude"], cells["Longitude"] = _cells(latitude * _DEG, 7), _cells(longitude * _DEG, 7)
-    heading = log["psi"] % (2.0 * np.pi)
+    heading, ordered = log["psi"] % (2.0 * np.pi), log["heading_order"] % (2.0 * np.pi)
     for column, values, digits in (
         ("C True Heading", heading * _DEG, 2), ("Pitch Angle", log["theta"] * _DEG, 2),
         ("Roll Angle", log["phi"] * _DEG, 2), ("DFS Depth (m)", log["z"], 3),
-        ("Vehicle Speed (kn)", log["speed"] / KNOT, 3), ("Next Heading", log["heading_order"] % (2.0 * np.pi) * _DEG, 2),
+        ("Vehicle Speed (kn)", log["speed"] / KNOT, 3), ("Next Heading", ordered * _DEG, 2),
         ("Next Speed (kn)", log["speed_order"] / KNOT, 3), ("Depth Goal (m)", log["depth_order"], 3),
     ):  # fmt: skip
         cells[column] = _cells(values, digits)
     moments = [datetime.datetime.fromtimestamp(at, tz=datetime.UTC) for at in stamps.tolist()]
     cells["Date"] = [f"{at.month}/{at.day}/{at.year}" for at in moments]
-    cells["Time"] = [f"{at.hour}:{at.minute:02d}:{at.second:02d}.{round(at.microsecond / 1e4) % 100:02d}" for at in moments]
+    cells["Time"] = [
+        f"{at.hour}:{at.minute:02d}:{at.second:02d}.{round(at.microsecond / 1e4) % 100:02d}" for at in moments
+    ]
     state = "SYNTHETIC" if log.synthetic else "N"
     fixed = {"Vehicle State": state, "Error State": state, "Batt State": "N", "Time to Empty": "0"}
     rows = [
