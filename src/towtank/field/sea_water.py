@@ -96,7 +96,7 @@ def passing_time(length: float, speed: float) -> float:
 def eddies(environment: Environment, step: float, count: int, pieces: int) -> Array:
     """Velocities (count, pieces, 3) [m/s, NED] of the eddies that ``count`` craft feel, ``step`` [s] apart.
 
-    Source     fossen2021, ch. 10: first-order Gauss-Markov process; gillespie1996, eq. 1.9a, for steps of any length:
+    Source     fossen2021, ch. 10: first-order Gauss-Markov process; gillespie1996 for steps of any length:
                c(t + dt) = f c(t) + std sqrt(1 - f^2) n, f = exp(-dt / T). It starts in its steady state.
     Departure  The sources let speed or one variable wander; here each of the three parts does, on its own.
     """
