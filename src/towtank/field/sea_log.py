@@ -15,6 +15,7 @@ from towtank.field.log import CHANNELS, FINS, MEASURED, Flag, SeaLog
 from towtank.field.sea import Swim
 from towtank.field.sea_water import check_seed
 from towtank.frames import Array
+from towtank.model.equations import Model
 from towtank.pilot.sensors import TYPICAL, Reading
 from towtank.provenance import digest, provenance
 
@@ -283,7 +284,7 @@ def _origin(
     alive = np.isfinite(swum.channels["x"][one])
     felt = swum.current[one][alive]
     return provenance(
-        {"model": digest([model.craft, vars(model.constants.c), model.options], 16)},
+        {"model": _hash(model)},
         synthetic=True,
         model_level=model.derivatives.level,
         environment=asdict(swum.environment),
@@ -299,6 +300,13 @@ def _origin(
                "current_std": felt.std(axis=0).tolist()},
         engine={"control_period": swum.clock.tick, "steps": swum.clock.steps},
     )  # fmt: skip
+
+
+def _hash(model: Model) -> str:
+    """Hash of all numbers that move ``model``."""
+    k = model.constants
+    extra = dict(k.extra.values) if k.extra else {}
+    return digest([model.craft.name, k.body, vars(k.c), k.added, k.fins, k.options, k.screw, extra], 16)
 
 
 MARKS = 100
