@@ -205,3 +205,71 @@ def test_an_empty_file_is_refused(name, tmp_path):
     (tmp_path / name).write_bytes(b"")
     with pytest.raises(InputError, match=r"empty|not a whole"):
         read_sea_log(tmp_path / name, LOGS / f"{name.partition('.')[0]}.toml")
+
+
+def test_a_bag_of_ros2_is_read_from_its_folder_or_its_one_file():
+    whole = read_sea_log(LOGS / "petrel3", LOGS / "petrel.toml")
+    for path in (LOGS / "petrel3" / "petrel3.mcap", LOGS / "petrel2" / "petrel2.db3"):
+        log = read_sea_log(path, LOGS / "petrel.toml")
+        np.testing.assert_array_equal(log["u"], whole["u"])
+
+
+def test_packed_variables_of_netcdf_are_unpacked_and_told(tmp_path):
+    from towtank.netcdf import Variable, encode
+
+    stored = np.array([0, 100, -32768, 300], dtype=np.int16)
+    attrs = {"units": "m", "scale_factor": "0.01", "add_offset": "2.0", "_FillValue": "-32768"}
+    rows = {"t": Variable(("t",), np.arange(4.0), {"units": "s"}), "d": Variable(("t",), stored, attrs)}
+    (tmp_path / "log.nc").write_bytes(encode(rows, {}))
+    (tmp_path / "map.toml").write_text(
+        'schema = "towtank/sea-log/1"\n[clock]\ncolumns = "t"\n[channels]\nz = "d"\n', encoding="utf-8"
+    )
+    log = read_sea_log(tmp_path / "log.nc", tmp_path / "map.toml")
+    np.testing.assert_allclose(log["z"], [2.0, 3.0, np.nan, 5.0])
+    assert any("unpacked by scale_factor 0.01" in text for text in log.conversions)
+    assert any("1 fill values" in text for text in log.conversions)
+
+
+@pytest.mark.parametrize("kind", ["5", "7.3"])
+def test_one_column_of_a_matrix_in_a_mat_file(kind, tmp_path):
+    import h5py
+    from scipy.io import savemat
+
+    t, servo = np.arange(5.0)[:, None], np.degrees(sea.fins(np.arange(5.0)))
+    path = tmp_path / "log.mat"
+    if kind == "5":
+        savemat(path, {"log": {"t": t, "servo": servo}})
+    else:
+        with h5py.File(path, "w") as file:
+            file["log/t"], file["log/servo"] = t.T, servo.T
+    text = 'schema = "towtank/sea-log/1"\n[clock]\ncolumns = "log.t"\n[channels]\n'
+    text += 'delta1 = { column = "log.servo(:,3)", unit = "deg" }\n'
+    (tmp_path / "map.toml").write_text(text)
+    log = read_sea_log(path, tmp_path / "map.toml")
+    np.testing.assert_allclose(log["delta1"], sea.fins(np.arange(5.0))[:, 2], atol=1e-12)
+    (tmp_path / "map.toml").write_text(text.replace("(:,3)", "(:,5)"))
+    with pytest.raises(InputError, match="asks for a column of 4"):
+        read_sea_log(path, tmp_path / "map.toml")
+
+
+def test_a_variable_that_two_programs_post_is_read_from_one(tmp_path):
+    lines = ["%% LOGSTART 0"]
+    for i in range(5):
+        lines += [f"{i:.2f} NAV_X pNav {i}", f"{i + 0.01:.2f} NAV_X uSim {100 + i}", f"{i:.2f} NAV_Y pNav {2 * i}"]
+    (tmp_path / "log.alog").write_text("\n".join(lines) + "\n")
+    text = 'schema = "towtank/sea-log/1"\n[channels]\nx = "NAV_Y"\n'
+    (tmp_path / "map.toml").write_text(text + 'y = { column = "NAV_X", where = { source = "pNav" } }\n')
+    log = read_sea_log(tmp_path / "log.alog", tmp_path / "map.toml")
+    np.testing.assert_array_equal(log["y"], np.arange(5.0))
+    np.testing.assert_array_equal(log["x"], 2.0 * np.arange(5.0))
+
+
+def test_degree_signs_of_latin_1_and_rows_in_reverse(tmp_path):
+    rows = [f"{9 - i},{350 + 3 * (9 - i) if 9 - i < 4 else 3 * (9 - i) - 10}" for i in range(10)]
+    (tmp_path / "log.csv").write_bytes("\r\n".join(["t [s],heading [°]", *rows, ""]).encode("latin-1"))
+    text = 'schema = "towtank/sea-log/1"\n[clock]\ncolumns = "t"\n[channels]\npsi = "heading"\n'
+    (tmp_path / "map.toml").write_text(text)
+    log = read_sea_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    np.testing.assert_allclose(log["psi"], np.radians(350.0 + 3.0 * np.arange(10.0)))
+    assert [(flag.kind, flag.count) for flag in log.flags] == [("clock", 10)]
+    assert "turned round" in log.flags[0].words

@@ -19,6 +19,8 @@ from towtank.field.reading.note import says_so
 from towtank.field.reading.raw import Fault, Group, Raw, table_of
 from towtank.field.reading.text import text_lines
 
+Posting = tuple[float, str, int, str]
+"""Time, value, line and source."""
 NOTE = "TOWTANK_NOTE"
 """Variable that holds what towtank says of its own log."""
 _START = re.compile(r"^%+\s*LOGSTART\s+(?P<at>[0-9.eE+-]+)")
@@ -37,7 +39,7 @@ def read_alog(path: Path) -> Raw:
     lines, faults = text_lines(path)
     start: float | None = None
     note: dict[str, Any] = {}
-    postings: dict[str, list[tuple[float, str, int]]] = defaultdict(list)
+    postings: dict[str, list[Posting]] = defaultdict(list)
     lost: list[int] = []
     for number, line in lines:
         if line.startswith("%"):
@@ -53,7 +55,7 @@ def read_alog(path: Path) -> Raw:
         elif found["name"] == NOTE:
             note |= _note(found["value"])
         else:
-            postings[found["name"]].append((at, found["value"].strip(), number))
+            postings[found["name"]].append((at, found["value"].strip(), number, found["source"]))
     count = sum(len(rows) for rows in postings.values())
     if len(lost) > max(count, 1):
         raise InputError(
@@ -72,23 +74,23 @@ def read_alog(path: Path) -> Raw:
     )
 
 
-def _group(title: str, name: str, rows: list[tuple[float, str, int]]) -> Group:
-    columns = {name: np.array([_number(value) for _, value, _ in rows])}
-    texts = {}
+def _group(title: str, name: str, rows: list[Posting]) -> Group:
+    columns = {name: np.array([_number(value) for _, value, *_ in rows])}
+    texts = {"source": tuple(source for *_, source in rows)}
     spoilt = {}
     if np.isnan(columns[name]).any():
-        texts[name] = tuple(value for _, value, _ in rows)
+        texts[name] = tuple(value for _, value, *_ in rows)
         bad = sum(
-            np.isnan(x) and v.lower() not in ("nan", "") for x, (_, v, _) in zip(columns[name], rows, strict=True)
+            np.isnan(x) and v.lower() not in ("nan", "") for x, (_, v, *_) in zip(columns[name], rows, strict=True)
         )
         if bad:
             spoilt[name] = int(bad)
-        for i, (_, value, _) in enumerate(rows):
+        for i, (_, value, *_) in enumerate(rows):
             for pair in _PAIR.finditer(value):
                 columns.setdefault(pair["key"], np.full(len(rows), np.nan))[i] = _number(pair["value"])
     names = tuple(columns)
     table = table_of(title, names, ("",) * len(names), np.column_stack([columns[key] for key in names]))
-    lines = np.array([line for *_, line in rows], dtype=np.intp)
+    lines = np.array([line for _, _, line, _ in rows], dtype=np.intp)
     from dataclasses import replace
 
     return Group(replace(table, lines=lines), texts, np.array([at for at, *_ in rows]), spoilt)

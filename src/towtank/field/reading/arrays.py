@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from towtank.errors import InputError
 from towtank.field.reading.mapping import Channel, LogMap
 from towtank.field.reading.raw import Group, Raw
+from towtank.netcdf import decode
 from towtank.tank.imported.arrays import read_mat_columns, read_netcdf_columns
-from towtank.tank.imported.table import Table
+from towtank.tank.imported.table import Table, read_bytes
 
 Read = Callable[[Path, Sequence[str]], Table]
 
@@ -23,7 +27,35 @@ def read_netcdf_log(path: Path, mapping: LogMap) -> Raw:
     InputError
         Damaged, no such variable, or variables of one clock that differ in length.
     """
-    return Raw(path.name, _groups(path, mapping, read_netcdf_columns))
+    packed: dict[str, str] = {}
+    groups = _groups(path, mapping, lambda file, names: _unpacked(file, read_netcdf_columns(file, names), packed))
+    return Raw(path.name, groups, said=tuple(packed.values()))
+
+
+def _unpacked(path: Path, table: Table, said: dict[str, str]) -> Table:
+    """A table with the conventions of CF undone: number = packed * scale_factor + add_offset, and fill values empty."""
+    variables, _ = decode(read_bytes(path))
+    values = table.values.copy()
+    for i, name in enumerate(table.names):
+        attrs = variables[name].attrs
+        for key in ("_FillValue", "missing_value"):
+            none = values[:, i] == _number(attrs.get(key), np.nan)
+            if none.any():
+                values[none, i] = np.nan
+                said[f"{name} {key}"] = f"{name}: {int(none.sum())} fill values are taken as not measured"
+        scale, offset = _number(attrs.get("scale_factor"), 1.0), _number(attrs.get("add_offset"), 0.0)
+        if (scale, offset) != (1.0, 0.0):
+            values[:, i] = values[:, i] * scale + offset
+            said[name] = f"{name}: unpacked by scale_factor {scale:g} and add_offset {offset:g}"
+    return replace(table, values=values)
+
+
+def _number(text: str | None, default: float) -> float:
+    """An attribute as a number; it may stand in brackets, as an array of one."""
+    try:
+        return float(str(text).strip("[] ")) if text is not None else default
+    except ValueError:
+        return default
 
 
 def read_mat_log(path: Path, mapping: LogMap) -> Raw:

@@ -27,6 +27,8 @@ GAP = 3.0
 """Step, in median steps, above which samples are taken to be missing: two in a row. Judgement."""
 JUMP = 3600.0
 """Hole [s] above which the words name a clock that was set as a second reason. Judgement."""
+REVERSED = 0.9
+"""Share of steps back in time above which a file is taken for one in reverse. Judgement."""
 OUT_OF_ORDER = 0.5
 """Share of samples out of order above which the order of the file is not understood. Judgement."""
 _TIME = re.compile(r"^(?P<h>\d{1,2}):(?P<m>\d{1,2})(?::(?P<s>\d{1,2}(?:[.,]\d*)?))?\s*(?P<half>[AaPp][Mm])?$")
@@ -192,6 +194,9 @@ def ordered(time: Array, clock: Clock, where: str) -> Order:
     if len(kept) < len(time):
         lost = len(time) - len(kept)
         flags.append(Flag("format", "time", 0.0, 0.0, lost, f"{where}: {lost} rows without a readable time: left out"))
+    if len(kept) > 2 and (np.diff(time[kept]) < 0.0).mean() > REVERSED:
+        flags.append(_flag("clock", time[kept], f"{where}: the rows are in reverse order of time: turned round"))
+        kept = kept[::-1]
     if clock.reset == "continue":
         time, moved = _continued(time, kept)
         flags += [Flag("clock", "time", at, at, 1, f"{where}: {words}") for at, words in moved]

@@ -25,7 +25,7 @@ from towtank.field.reading.mapping import GIVEN, Channel, LogMap
 from towtank.field.reading.merging import merged, stood
 from towtank.field.reading.note import MARK, numbers
 from towtank.field.reading.opening import Opened, clock_of, lane_of, opened
-from towtank.field.reading.raw import Group, Raw, Rows
+from towtank.field.reading.raw import Group, Rows
 from towtank.field.reading.values import Series, column_in_si, held_out, rows_where
 from towtank.frames import Array
 from towtank.provenance import provenance
@@ -65,7 +65,7 @@ def read_sea_log(
     columns = turned(columns, found.mapping.axes, said)
     columns = finished_angles(time, columns, found.mapping, said)
     columns, lost = _finished(time, columns, found, said)
-    flags = (*_joined(flags), *lost, *_all_faults(found.raw, time))
+    flags = (*_joined(flags), *lost, *_all_faults(found, time))
     limits = {
         key: _limits(key, channel) for key, channel in found.channels.items() if channel.limits and key in columns
     }
@@ -202,15 +202,20 @@ def _limits(key: str, channel: Channel) -> tuple[float, float]:
     return si(low, unit, f"channels.{key}.limits"), si(high, unit, f"channels.{key}.limits")
 
 
-def _all_faults(raw: Raw, time: Array) -> list[Flag]:
+def _all_faults(found: Opened, time: Array) -> list[Flag]:
+    """Flags on what could not be read, of the columns that are mapped."""
     start, end = 0.0, float(time[-1] - time[0])
-    out = [Flag("format", "time", start, end, fault.count, fault.words) for fault in raw.faults]
-    for name, group in raw.groups.items():
-        for column, count in group.spoilt.items():
-            if group.rows > count:
-                where = f"{name}: " if name else ""
-                words = f"{where}{count} cells of {column!r} hold no number: taken as not measured"
-                out.append(Flag("format", "time", start, end, count, words))
+    out = [Flag("format", "time", start, end, fault.count, fault.words) for fault in found.raw.faults]
+    for key, channel in found.channels.items():
+        name, column = found.place(channel)
+        group = found.raw.groups[name]
+        if not group.table.holds(column):
+            continue
+        header = group.table.names[group.table.find(column)]
+        count = group.spoilt.get(header, 0)
+        if count:
+            words = f"{count} cells of {header!r} hold no number: taken as not measured"
+            out.append(Flag("format", key if key in CHANNELS else "time", start, end, count, words))
     return out
 
 

@@ -22,7 +22,9 @@ from towtank.field.reading.ros import read_ros, topics_of
 from towtank.field.reading.text import NOTE, read_delimited_log
 from towtank.tank.imported.table import read_bytes
 
-ENDINGS: Mapping[str, str] = {".nc": "netcdf", ".mat": "mat", ".alog": "alog", ".bag": "ros", ".h5": "netcdf"}
+ENDINGS: Mapping[str, str] = {
+    ".nc": "netcdf", ".mat": "mat", ".alog": "alog", ".bag": "ros", ".h5": "netcdf", ".mcap": "ros", ".db3": "ros",
+}  # fmt: skip
 """Ending of a file -> format; all others are text."""
 _IVER = ("latitude;longitude;", "c true heading")
 _IMC = "timestamp (seconds since 01/01/1970)"
@@ -78,7 +80,7 @@ def opened(path: Path, mapping: Path | str | LogMap | None, craft: str | Path | 
     numbered = found.model_copy(update={"channels": channels})
     raw = _read(path, form, numbered)
     kept, said = _present(raw, form, numbered)
-    words = [*([found.note] if found.note else []), *(f"assumed: {text}" for text in found.assumes), *said]
+    words = [*([found.note] if found.note else []), *(f"assumed: {text}" for text in found.assumes), *raw.said, *said]
     return Opened(raw, numbered, kept, owner, form, Path(name).name, tuple(words))
 
 

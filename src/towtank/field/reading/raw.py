@@ -60,6 +60,7 @@ class Raw:
 
     groups : name -> table; "" where there is one.   epoch [s, UTC] : zero of the groups' times, None when not known.
     note : what the file says of itself in towtank's words.   faults : parts that could not be read.
+    said : what the reader did to its numbers.
     """
 
     title: str
@@ -67,6 +68,7 @@ class Raw:
     epoch: float | None = None
     note: Mapping[str, Any] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
+    said: tuple[str, ...] = ()
 
     def split(self, column: str) -> tuple[str, str]:
         """Group and column of "GROUP:COLUMN", or of a bare column in a file of one table."""

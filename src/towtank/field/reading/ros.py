@@ -39,7 +39,7 @@ def read_ros(path: Path, wanted: Mapping[str, Sequence[str]], sparse: bool) -> R
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError(f'{path}: reading a bag needs rosbags. Install it: pip install "towtank[field]".') from None
-    usual = get_typestore(Stores.ROS2_HUMBLE if path.is_dir() else Stores.ROS1_NOETIC)
+    usual = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)
     try:
         with AnyReader([path], default_typestore=usual) as reader:
             return _read(path, reader, wanted, sparse)

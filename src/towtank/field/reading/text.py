@@ -28,7 +28,7 @@ SPOILT_LINES = 0.5
 """Share of lines that cannot be read above which the file is taken for one of another layout. Judgement."""
 CONTROL = 0.01
 """Share of control characters above which a file is taken for no text; damaged blocks of a log stay below it."""
-_CONTROLS = frozenset(chr(code) for code in (*range(9), 11, 12, *range(14, 32)))
+_CONTROLS = frozenset(chr(code) for code in (*range(9), 11, 12, *range(14, 32), *range(127, 160)))
 STATE = "Error State"
 """Column of an Iver log, which has no comments, that says whether it is made up."""
 Lines = list[tuple[int, str]]
@@ -59,24 +59,32 @@ def text_lines(path: Path) -> tuple[Lines, tuple[Fault, ...]]:
         Missing, empty, or not text.
     """
     content = read_bytes(path)
-    marked = content[:2] in (b"\xff\xfe", b"\xfe\xff")
-    found = content.decode("utf-16" if marked else "utf-8-sig", errors="replace")
+    found = _decoded(content)
     bad = sum(found.count(mark) for mark in _CONTROLS)
-    odd = found.count("\ufffd")
     if bad > CONTROL * len(found) and not _mostly_text(found):
         raise InputError(
             f"{path} is not a text file ({bad} control characters of {len(found)}). Give the exported table, not the "
             "file of the program itself; a MAT, netCDF or bag file is known by its ending."
         )
     lines = [(i, line) for i, line in enumerate(found.splitlines(), start=1) if line.strip()]
-    clean = [(i, line) for i, line in lines if not _CONTROLS & set(line) and not (odd and line.count("\ufffd") > 4)]
+    clean = [(i, line) for i, line in lines if not _CONTROLS & set(line)]
     if not clean:
         raise InputError(f"{path} holds no line of text. It is damaged, or of another format.")
-    lost = [i for i, line in lines if _CONTROLS & set(line) or (odd and line.count("\ufffd") > 4)]
+    lost = [i for i, line in lines if _CONTROLS & set(line)]
     said = [Fault(len(lost), f"{_places(lost)} not text: left out")] if lost else []
     if not found.endswith(("\n", "\r")):
         said.append(Fault(1, f"line {lines[-1][0]}, the last, has no end: it may be cut off"))
     return clean, tuple(said)
+
+
+def _decoded(content: bytes) -> str:
+    """Text in UTF-16 with a mark, UTF-8, or Latin-1 where it is neither."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def _mostly_text(found: str) -> bool:

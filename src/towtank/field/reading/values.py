@@ -123,11 +123,10 @@ def rows_where(group: Group, channel: Channel) -> Rows:
     """Rows in which the columns of ``channel.where`` hold what they should."""
     keep = np.ones(group.rows, dtype=bool)
     for column, value in channel.where.items():
-        place = group.table.find(column)
         if isinstance(value, str):
             keep &= np.array([cell.strip() == value for cell in group.cells(column)])
         else:
-            keep &= group.table.values[:, place] == value
+            keep &= group.table.values[:, group.table.find(column)] == value
     return np.flatnonzero(keep)
 
 

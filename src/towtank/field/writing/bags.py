@@ -98,7 +98,7 @@ def _messages(log: SeaLog, t: Any) -> Sent:
     stamps = [start + round(at * SECOND) for at in log.time.tolist()]
     sent: Sent = [(stamps[0], NOTE, "std_msgs/msg/String", t["std_msgs/msg/String"](data=note_text(log)))]
     sent += _odometry(log, stamps, t)
-    water = np.stack([log[name] for name in ("ahead", "slip", "plunge")], axis=-1) @ _FLU
+    water = np.stack([log["ahead"], -log["slip"], -log["plunge"]], axis=-1)
     for i in np.flatnonzero(np.isfinite(water).any(axis=-1)):
         twist = _twist(t, np.concatenate([water[i], np.zeros(3)]))
         kind = "geometry_msgs/msg/TwistStamped"
@@ -133,8 +133,9 @@ def _whole(log: SeaLog) -> bool:
 
 
 def _odometry(log: SeaLog, stamps: list[int], t: Any) -> Sent:
-    position = np.stack([log[name] for name in "xyz"], axis=-1) @ _ENU.T
-    nu = np.stack([log[name] for name in _TWIST], axis=-1) @ np.kron(np.eye(2), _FLU)
+    # Part by part, so that one that was not measured does not spoil the others.
+    position = np.stack([log["y"], log["x"], -log["z"]], axis=-1)
+    nu = np.stack([log["u"], -log["v"], -log["w"], log["p"], -log["q"], -log["r"]], axis=-1)
     turned = np.full((len(stamps), 4), np.nan)
     attitude = np.stack([log[name] for name in ("phi", "theta", "psi")], axis=-1)
     known = np.isfinite(attitude).all(axis=-1)
