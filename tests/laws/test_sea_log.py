@@ -203,6 +203,17 @@ def test_orders_stand_where_they_were_given():
     assert set(np.unique(np.round(np.degrees(log["rudder"]), 6))) <= {-10.0, 0.0, 10.0}
 
 
+def test_a_trial_that_waits_in_vain_says_for_what(tmp_path):
+    path = tmp_path / "wait.toml"
+    path.write_text(
+        'schema = "towtank/trial/1"\nname = "wait"\n[[command]]\nname = "never"\nheading = "0 deg"\n'
+        'until = "heading 90 deg"\nwithin = "5 s"\n', "utf-8",
+    )  # fmt: skip
+    model = remus_model()
+    log = observe(swim(model, trial_called(model, str(path)).ready, WATER), EXACT)
+    assert "'never' waited 5 s for psi = 1.571" in log.provenance["ended"]
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [

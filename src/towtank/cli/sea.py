@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from towtank.cli.chain import open_chain
-from towtank.cli.options import Debug, Json, Speed
+from towtank.cli.options import Debug, Json
 from towtank.cli.reply import Reply, answering
 from towtank.errors import InputError
 
@@ -75,6 +75,7 @@ Eddies = Annotated[
     str | None, _option("TIME|LENGTH", 'How long an eddy lasts, "20 s", or how long it is, "30 m". Default: 20 s.')
 ]
 Minutes = Annotated[float | None, _option("MIN", "Length of the survey. Default: 10.")]
+Speed = Annotated[str | None, _option("SPEED", 'Of the survey, such as "1 m/s" or "2 knot". Default: the craft\'s.')]
 InstrumentsWord = Annotated[
     str, typer.Option("--instruments", metavar="standard|exact|FILE.toml", help="What measures, and how well.")
 ]

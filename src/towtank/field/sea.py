@@ -188,6 +188,8 @@ class _Voyage:
         turns, plan = 0.0, self._plan({}, 0.0)
         while True:
             flights = self._fly([leg for _, leg in plan], current)
+            if (flights.ended == Ended.STOPPED).any():
+                raise KeyboardInterrupt
             slip = round((float(flights.log[0, 0, self.names.index("psi")]) - self._heading(turns)) / (2.0 * np.pi))
             turns, taken = turns + slip, ({} if slip else {**taken, **self._events(plan, flights)})
             again = self._plan(taken, turns)

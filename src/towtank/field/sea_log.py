@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from towtank.engine.plan import Ended
 from towtank.errors import InputError
 from towtank.field.log import CHANNELS, FINS, MEASURED, Flag, SeaLog
 from towtank.field.sea import Swim
@@ -295,11 +296,20 @@ def _origin(
         trial={"name": swum.trial.name, "kind": swum.trial.kind, "loop": swum.trial.loop, "speed": s.speed,
                "thrust": s.thrust, "current": list(swum.trial.current), "notes": [*s.notes, *notes],
                "marks": list(swum.marks[:MARKS]), "legs": len(swum.trial.legs)},
-        ended=ENDINGS[int(swum.ended[one])],
+        ended=_ended(swum, one),
         drawn={"offsets": dict(offsets), "current_mean": felt.mean(axis=0).tolist(),
                "current_std": felt.std(axis=0).tolist()},
         engine={"control_period": swum.clock.tick, "steps": swum.clock.steps},
     )  # fmt: skip
+
+
+def _ended(swum: Swim, one: int) -> str:
+    """What ended a swim, in words."""
+    words = ENDINGS[int(swum.ended[one])]
+    late = swum.trial.legs[min(len(swum.marks), len(swum.trial.legs)) - 1]
+    if swum.ended[one] != Ended.LATE or late.until is None:
+        return words
+    return f"{words}: leg {late.name!r} waited {late.within:.0f} s for {late.until.channel} = {late.until.level:.4g}"
 
 
 def _hash(model: Model) -> str:
