@@ -29,8 +29,9 @@ BASE = 24.0
 """Lengths travelled in the longest period of the sines."""
 HARMONICS = range(3, 25)
 """Multiples of the base frequency: periods from 8 lengths to 1, around the modes of a slender craft."""
-SHARE = (0.12, 0.10, 0.08)
-"""Root mean square of the sines of rudder, elevator and aileron, as shares of the fins' limit."""
+SHARE = (0.30, 0.25, 0.20)
+"""Root mean square of the sines of rudder, elevator and aileron, as shares of the fins' limit. On a heavy, slow craft
+weaker ones leave the scale of the sway and heave loads open: only the acceleration tells it from the mass."""
 BLOCK = 8.0
 """Lengths travelled in one block."""
 THROTTLES = (1.0, 0.49, 1.96, 0.72, 1.44)
