@@ -299,7 +299,8 @@ def test_whatever_the_clock_every_row_is_kept_or_counted(folder, times):
     except InputError:
         return
     assert (np.diff(log.time) > 0.0).all()
-    lost = sum(flag.count for flag in log.flags if flag.kind in ("repeat", "clock") and flag.channel == "time")
+    out = [flag for flag in log.flags if flag.kind in ("repeat", "clock") and "turned round" not in flag.words]
+    lost = sum(flag.count for flag in out if flag.channel == "time")
     assert len(log.time) + lost == len(times)
 
 
@@ -400,6 +401,16 @@ def test_spikes_are_flagged_and_nothing_else_is(folder):
     assert np.flatnonzero(outliers(z)).tolist() == [50, 51, 200]
 
 
+@pytest.mark.parametrize(("noise", "jumped"), [(0.0, 30.0), (1.5, 30.0), (0.02, -4.0), (1.5, 0.0), (0.0, 0.0)])
+def test_a_place_that_jumps_and_stays_is_flagged_where_it_does(noise, jumped, folder):
+    rng = np.random.default_rng(4)
+    t = 0.1 * np.arange(300)
+    x = 2.0 * t + noise * rng.standard_normal(300) + jumped * (np.arange(300) >= 120)
+    log = read(folder, {"t": t, "x": x}, {"x": "x"})
+    seen = [(flag.kind, flag.start) for flag in log.flags]
+    assert seen == ([("outlier", pytest.approx(11.9))] if jumped else [])
+
+
 def test_noise_steps_and_turns_are_no_outliers():
     rng = np.random.default_rng(0)
     found = sum(int(outliers(rng.standard_normal(1000)).sum()) for _ in range(100))
@@ -497,6 +508,8 @@ def test_faults_of_a_mapping_are_told_with_their_place(document, said):
         ("t,z\n0,one\n1,two\n2,three\n", "no number in it"),
         ("when,z\n0,1\n1,2\n", "no column 't'"),
         ("t,z\na,1\nb,2\n", 'the clock is of kind "elapsed"'),
+        ("t,z\n0,1\n", "Two or more make a log"),
+        ("t,z\n4,1\n4,2\n4,3\n", "Two or more make a log"),
     ],
 )
 def test_tables_of_text_are_read_or_refused_with_a_reason(text, said, tmp_path):
@@ -509,3 +522,9 @@ def test_tables_of_text_are_read_or_refused_with_a_reason(text, said, tmp_path):
     spoilt = int("two" in text)
     assert sum(flag.count for flag in log.flags if flag.kind == "format") == spoilt
     assert int(np.isnan(log["z"]).sum()) == spoilt
+
+
+def test_a_mapped_channel_without_a_number_is_flagged(tmp_path):
+    (tmp_path / "log.csv").write_text("t,z,u\n0,,1\n1,,2\n2,,3\n")
+    log = read_sea_log(tmp_path / "log.csv", mapped({"z": "z", "u": "u"}))
+    assert [(flag.kind, flag.channel, flag.count) for flag in log.flags] == [("gap", "z", 3)]

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import shutil
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import sea_samples as sea
-from towtank.errors import InputError
+from towtank.errors import InputError, TowtankError
 from towtank.field.reading import read_sea_log
 
 LOGS = sea.FOLDER
@@ -273,3 +277,82 @@ def test_degree_signs_of_latin_1_and_rows_in_reverse(tmp_path):
     np.testing.assert_allclose(log["psi"], np.radians(350.0 + 3.0 * np.arange(10.0)))
     assert [(flag.kind, flag.count) for flag in log.flags] == [("clock", 10)]
     assert "turned round" in log.flags[0].words
+
+
+def test_messages_of_other_systems_in_an_imc_log_are_left_out_and_counted(tmp_path):
+    shutil.copytree(LOGS / "imc", tmp_path / "imc")
+    path = tmp_path / "imc" / "EstimatedState.csv"
+    lines = path.read_bytes().decode().split("\r\n")
+    strange = [line.replace("lauv-sample", "ccu-boat") for line in lines[5:8]]
+    path.write_text("\r\n".join([*lines[:8], *strange, *lines[8:]]), newline="")
+    log, whole = read_sea_log(tmp_path / "imc"), read_sea_log(LOGS / "imc")
+    np.testing.assert_array_equal(log["x"], whole["x"])
+    assert [(flag.kind, flag.count) for flag in log.flags] == [("format", 3)]
+    assert "3 messages of ccu-boat left out; the craft is lauv-sample" in log.flags[0].words
+
+
+def test_a_csv_whose_gps_has_a_clock_of_its_own(tmp_path):
+    t = np.arange(0.0, 6.0, 0.5)
+    fixes = np.where(np.arange(12) % 4 == 0, t + 0.123, np.nan)
+    rows = [
+        f"{a},{5 + a},{'' if np.isnan(b) else b},{'' if np.isnan(b) else 2 * b}" for a, b in zip(t, fixes, strict=True)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join(["t,depth,tg,xg", *rows, ""]))
+    text = 'schema = "towtank/sea-log/1"\n[clock]\ncolumns = "t"\n[channels]\nz = { column = "depth", unit = "m" }\n'
+    (tmp_path / "map.toml").write_text(text + 'x = { column = "xg", unit = "m", time = "tg" }\n')
+    log = read_sea_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    known = np.isfinite(log["x"])
+    np.testing.assert_allclose(log["x"][known], 2.0 * log.time[known])
+    np.testing.assert_allclose(log.time[known], [0.123, 2.123, 4.123])
+    assert np.isfinite(log["z"]).sum() == 12
+    assert log.flags == ()
+
+
+def test_without_the_library_of_bags_the_way_to_it_is_told(monkeypatch, tmp_path):
+    from towtank.field.writing import write_as
+
+    log = read_sea_log(LOGS / "tern.nc", LOGS / "tern.toml")
+    for name in ("rosbags.highlevel", "rosbags.typesys"):
+        monkeypatch.setitem(sys.modules, name, None)
+    for path, mapping in (("petrel.bag", "petrel.toml"), ("petrel2", None)):
+        with pytest.raises(InputError, match=r"needs rosbags. Install it: pip install"):
+            read_sea_log(LOGS / path, LOGS / mapping if mapping else None)
+    for form in ("ros1", "ros2"):
+        with pytest.raises(InputError, match=r"needs rosbags. Install it: pip install"):
+            write_as(log, tmp_path / "log", form)
+
+
+DAMAGED = {
+    "kestrel.csv": "kestrel.toml", "heron.csv": "heron.toml", "iver.log": None, "moos.alog": "moos.toml",
+    "osprey.mat": "osprey.toml", "osprey73.mat": "osprey.toml", "tern.nc": "tern.toml", "petrel.bag": "petrel.toml",
+    "petrel3/petrel3.mcap": "petrel.toml", "petrel2/petrel2.db3": "petrel.toml", "imc/EstimatedState.csv": None,
+}  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    name=st.sampled_from(sorted(DAMAGED)), place=st.floats(0.0, 1.0), length=st.integers(1, 400),
+    seed=st.integers(0, 99), how=st.sampled_from(["overwritten", "lost", "repeated", "cut"]),
+)  # fmt: skip
+def test_a_log_damaged_anywhere_is_read_or_refused_in_words(name, place, length, seed, how, tmp_path_factory):
+    content = bytearray((LOGS / name).read_bytes())
+    at = int(place * (len(content) - 1))
+    noise = np.random.default_rng(seed).integers(0, 256, length, dtype=np.uint8).tobytes()
+    match how:
+        case "overwritten":
+            content[at : at + length] = noise
+        case "lost":
+            del content[at : at + length]
+        case "repeated":
+            content[at:at] = content[at : at + length]
+        case "cut":
+            del content[at:]
+    path = tmp_path_factory.mktemp("damaged") / Path(name).name
+    path.write_bytes(bytes(content))
+    mapping = DAMAGED[name]
+    try:
+        log = read_sea_log(path, LOGS / mapping if mapping else None)
+    except TowtankError as error:
+        assert len(str(error)) > 20  # noqa: PT017
+    else:
+        assert (np.diff(log.time) > 0.0).all()

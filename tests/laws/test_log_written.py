@@ -159,3 +159,57 @@ def test_a_log_of_towtank_takes_no_mapping(tmp_path):
     with pytest.raises(InputError, match="Leave the mapping out"):
         read_sea_log(path, "imc")
     assert read_sea_log(path, "towtank").synthetic
+
+
+def test_bags_hold_the_messages_of_ros_in_the_axes_of_rep_103(tmp_path):
+    """Read by the library itself: a craft that heads north, bow up, at 2 m/s, 5 m deep."""
+    from rosbags.highlevel import AnyReader
+
+    t = np.arange(3.0)
+    rows = {"x": 10.0 + 2.0 * t, "y": 3.0 + 0.0 * t, "z": 5.0 + 0.0 * t, "phi": 0.0 * t, "theta": 0.1 + 0.0 * t,
+            "psi": 0.0 * t, "u": 2.0 + 0.0 * t, "v": 0.3 + 0.0 * t, "r": 0.2 + 0.0 * t, "delta2": 0.1 * t}  # fmt: skip
+    path = write_as(SeaLog("swim", "hokie", t, rows, synthetic=True, epoch=1.75e9), tmp_path / "log", "ros1")
+    seen = {}
+    with AnyReader([path]) as reader:
+        for connection, at, data in reader.messages():
+            seen.setdefault(connection.topic, []).append((at, reader.deserialize(data, connection.msgtype)))
+    assert set(seen) == {"/towtank/note", "/towtank/odometry", "/towtank/fins"}
+    at, odometry = seen["/towtank/odometry"][1]
+    place, turn, twist = odometry.pose.pose.position, odometry.pose.pose.orientation, odometry.twist.twist
+    assert at == 1750000001 * 10**9 == odometry.header.stamp.sec * 10**9
+    assert (place.x, place.y, place.z) == (3.0, 12.0, -5.0)  # east, north, up
+    assert (twist.linear.x, twist.linear.y, twist.angular.z) == (2.0, -0.3, -0.2)  # forward, port, about up
+    # North is a quarter turn from east about up; then bow up is a turn of -0.1 about port.
+    half, pitch = np.pi / 4.0, -0.05
+    expected = np.array([np.cos(half) * np.cos(pitch), -np.sin(half) * np.sin(pitch), np.cos(half) * np.sin(pitch),
+                         np.sin(half) * np.cos(pitch)])  # fmt: skip
+    got = np.array([turn.w, turn.x, turn.y, turn.z])
+    np.testing.assert_allclose(got * np.sign(got[0]), expected, atol=1e-12)
+    assert seen["/towtank/fins"][1][1].position[1] == pytest.approx(0.1)
+    assert "SYNTHETIC" in seen["/towtank/note"][0][1].data
+
+
+def test_texts_of_vehicles_hold_what_their_programs_write(tmp_path):
+    t = np.arange(3.0)
+    rows = {"x": 10.0 + t, "y": -2.0 * t, "z": 5.0 + t, "psi": np.radians(350.0) + 0.0 * t, "delta2": 0.1 * t,
+            "phi": 0.0 * t, "theta": 0.0 * t, "speed": 1.0 + 0.0 * t}  # fmt: skip
+    log = SeaLog("swim", "hokie", t, rows, synthetic=True, epoch=1714640400.0, datum=(0.6, -1.2))
+    alog = write_as(log, tmp_path / "log", "alog").read_text()
+    found = {line.split()[1]: line.split() for line in alog.splitlines() if line.startswith("1.0")}
+    assert "%% LOGSTART        1714640400.000000" in alog
+    assert float(found["NAV_X"][3]) == -2.0  # east
+    assert float(found["NAV_Y"][3]) == 11.0
+    assert float(found["NAV_HEADING"][3]) == pytest.approx(350.0)
+    folder = write_as(log, tmp_path / "log", "imc")
+    head, row, *_ = (folder / "ServoPosition.csv").read_text().splitlines()
+    assert head == "timestamp (seconds since 01/01/1970), system, entity , id, value (rad)"
+    assert row == "1714640400.000000, hokie, towtank, 1, 0.0"
+    state = (folder / "EstimatedState.csv").read_text().splitlines()
+    assert state[0].startswith(
+        "timestamp (seconds since 01/01/1970), system, entity , lat (rad), lon (rad), height (m), x"
+    )
+    iver = write_as(log, tmp_path / "log", "iver").read_text().splitlines()
+    cells = dict(zip(iver[0].split(";"), iver[1].split(";"), strict=True))
+    assert (cells["Date"], cells["Time"], cells["C True Heading"]) == ("5/2/2024", "9:00:00.00", "350.00")
+    assert float(cells["Latitude"]) == pytest.approx(np.degrees(0.6) + 10.0 / 111e3, abs=2e-6)
+    assert cells["Error State"] == "SYNTHETIC"

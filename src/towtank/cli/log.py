@@ -114,7 +114,7 @@ def _tell(reply: Reply, record: SeaLog) -> None:
         )
         rate = "" if row["rate"] is None else f"{row['rate']:.3g}"
         spread = "".join(
-            f"{'' if row[key] is None else format(factor * row[key], '.5g'):>12}" for key in ("min", "max")
+            f"{'' if row[key] is None else format(factor * row[key] + 0.0, '.5g'):>12}" for key in ("min", "max")
         )
         reply.say(f"  {name:<14}{unit:<7}{row['samples']:>8}{rate:>9}{spread}{noise:>14}")
     for title, lines in (("Converted:", record.conversions), ("Doubtful:", _flags(record))):

@@ -73,6 +73,11 @@ def _beside(time: Array, order: Array, psi: Array) -> Array:
 
 
 def _depth(pressure: Array, mapping: LogMap, said: list[str]) -> Array:
+    """Depth (N,) [m] of a pressure cell.
+
+    Source     newman1977, ch. 3: hydrostatic pressure.
+    Valid      Water of one density, no waves: surface waves of half the height a change it by a near the surface.
+    """
     surface = si(mapping.pressure.surface, "Pa", "pressure.surface")
     density = si(mapping.pressure.density, "kg/m^3", "pressure.density")
     stated = mapping.pressure.model_fields_set

@@ -34,6 +34,8 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "revolutions": (-200.0, 200.0), "throttle": (-20.0, 20.0), "depth_order": (-10.0, 11000.0),
 }  # fmt: skip
 """Channel -> what it can be for any craft [SI]; a mapping states closer limits."""
+FASTEST = 20.0
+"""Speed [m/s] that no craft here has: a place that moves faster has jumped."""
 _TESTED = (*MEASURED, "delta1", "delta2", "delta3", "delta4")
 Mask = NDArray[np.bool_]
 
@@ -57,6 +59,11 @@ def doubts_of(
             flags += _still(name, at, values)
         if name in _TESTED and len(values) >= FEW:
             odd = outliers(values)
+            if name in ("x", "y", "z"):
+                jumps = _jumps(at, values)
+                flags += [_jump(name, at, values, int(i)) for i in jumps]
+                # Beside a jump the neighbours of a moving craft are no measure.
+                odd &= ~np.any(np.abs(np.arange(len(odd)) - jumps[:, None] - 0.5) < HALF_WINDOW + 1, axis=0)
             if odd.any():
                 worst = int(np.argmax(np.where(odd, np.abs(values - np.median(values)), -1.0)))
                 words = f"{int(odd.sum())} values of {name} are beyond {SIGMAS:g} robust standard deviations of their "
@@ -87,6 +94,24 @@ def outliers(values: Array) -> Mask:
     scale = np.maximum(MAD * np.median(around, axis=-1), floor)
     far = np.abs(values - np.median(windows, axis=-1)) > SIGMAS * floor
     return np.asarray(far & (off > SIGMAS * scale) & (scale > 0.0))
+
+
+def _jump(name: str, time: Array, values: Array, i: int) -> Flag:
+    step, took = values[i + 1] - values[i], time[i + 1] - time[i]
+    words = f"{name} jumps by {step:.4g} m in {took:.3g} s and stays there: a fix, or navigation set anew"
+    return Flag("outlier", name, float(time[i]), float(time[i + 1]), 1, words)
+
+
+def _jumps(time: Array, values: Array) -> NDArray[np.intp]:
+    """Samples before steps of a place that no craft makes and after which it stays."""
+    steps = np.diff(values)
+    noise = MAD * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, HALF_WINDOW, mode="edge"), HALF_WINDOW)
+    middle = np.median(windows, axis=-1)
+    shift = middle[HALF_WINDOW + 1 : -1] - middle[1 : -HALF_WINDOW - 1]
+    fast = (np.abs(steps) > FASTEST * np.diff(time)) & (np.abs(shift) > FASTEST * np.diff(time))
+    jumped = fast & (np.minimum(np.abs(steps), np.abs(shift)) > SIGMAS * noise)
+    return np.flatnonzero(jumped)
 
 
 def _still(name: str, time: Array, values: Array) -> list[Flag]:

@@ -58,6 +58,10 @@ def read_sea_log(
     series, flags, absolute, zero = _series(found, said)
     time, columns = merged(series, found.mapping.clock, said)
     columns = _held(found, columns, said)
+    if len(time) < 2:
+        raise InputError(
+            f"{path}: one sample with a time of its own. Two or more make a log; is this column the clock?"
+        )
     first = float(time[0])
     columns, datum = made(columns, found.mapping, _datum(found), said)
     if found.mapping.datum is None and found.raw.note.get("datum", datum) is None:
@@ -65,7 +69,7 @@ def read_sea_log(
     columns = turned(columns, found.mapping.axes, said)
     columns = finished_angles(time, columns, found.mapping, said)
     columns, lost = _finished(time, columns, found, said)
-    flags = (*_joined(flags), *lost, *_all_faults(found, time))
+    flags = (*_joined(flags), *lost, *_all_faults(found, time), *_never(time, columns))
     limits = {
         key: _limits(key, channel) for key, channel in found.channels.items() if channel.limits and key in columns
     }
@@ -126,6 +130,8 @@ def _series(found: Opened, said: list[str]) -> tuple[dict[str, Series], tuple[Fl
             continue
         times, counted = times_of(group, clock_of(channel, found), found.mapping.clock)
         absolute = absolute or counted
+        if channel.time and not group.spoilt.get(channel.time):  # rows of the common clock have no time of this one
+            rows = rows[np.isfinite(times[rows])]
         order = ordered(times[rows], found.mapping.clock, group.table.title)
         lanes[key], raw_times[key] = _Lane(group, order, rows), order.time
         # What is given only when it changes has no rate that a hole could be seen by.
@@ -177,6 +183,16 @@ def _finished(
     places = sensors_of(found.channels, found.mapping.sensors, found.craft)
     columns, flags = to_origin(time, columns, places, said)
     return {name: columns[name] for name in CHANNELS if name in columns}, flags
+
+
+def _never(time: Array, columns: Mapping[str, Array]) -> list[Flag]:
+    """Flags on channels that are mapped and of which nothing was measured."""
+    start, end = float(time[0]), float(time[-1])
+    return [
+        Flag("gap", name, start, end, len(time), f"nothing was measured of {name}")
+        for name, values in columns.items()
+        if not np.isfinite(values).any()
+    ]
 
 
 def _own_fins(columns: dict[str, Array], craft: Craft | None, said: list[str]) -> dict[str, Array]:

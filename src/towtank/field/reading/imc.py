@@ -7,8 +7,11 @@ Layout as ``CSVExporter`` of Neptus writes it: ``EstimatedState.csv`` with the h
 from __future__ import annotations
 
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from towtank.errors import InputError
 from towtank.field.reading.mapping import Text
@@ -16,6 +19,8 @@ from towtank.field.reading.note import says_so
 from towtank.field.reading.raw import Fault, Group, Raw
 from towtank.field.reading.text import read_delimited_log, table_of_lines, text_lines
 
+SYSTEM = "system"
+"""Column of who sent a message."""
 BOOK = "LogBookEntry"
 """Message whose text holds what towtank says of its own log."""
 
@@ -41,7 +46,34 @@ def read_imc(path: Path, wanted: frozenset[str]) -> Raw:
         raw = _message(file)
         groups[name] = raw.groups[""]
         faults += [Fault(fault.count, f"{file.name}: {fault.words}") for fault in raw.faults]
+    groups, strange = _of_one_system(groups)
+    faults += strange
     return Raw(path.name, groups, None, _note(files.get(BOOK)), tuple(faults))
+
+
+def _of_one_system(groups: dict[str, Group]) -> tuple[dict[str, Group], list[Fault]]:
+    """Messages of the craft itself: a log holds those that came from others by radio or sound as well.
+
+    The craft is the system with the most EstimatedState, or with the most messages where there is none.
+    """
+    told = [groups["EstimatedState"]] if "EstimatedState" in groups else list(groups.values())
+    senders = Counter(cell for group in told for cell in group.texts.get(SYSTEM, ()))
+    if not senders:
+        return groups, []
+    own = senders.most_common(1)[0][0]
+    out, faults = {}, []
+    for name, group in groups.items():
+        cells = np.array(group.texts.get(SYSTEM, ()))
+        others = sorted({str(cell) for cell in cells} - {own})
+        if not others:
+            out[name] = group
+            continue
+        kept = np.flatnonzero(cells == own)
+        words = f"{name}: {len(cells) - len(kept)} messages of {', '.join(others)} left out; the craft is {own}"
+        faults.append(Fault(len(cells) - len(kept), words))
+        if len(kept):
+            out[name] = group.take(kept)
+    return out, faults
 
 
 def _message(path: Path) -> Raw:

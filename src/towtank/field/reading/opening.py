@@ -62,6 +62,10 @@ def opened(path: Path, mapping: Path | str | LogMap | None, craft: str | Path | 
     """
     if not path.exists():
         raise InputError(f"{path} does not exist. Give a log file, or the folder of a ROS 2 bag or of IMC messages.")
+    if path.is_file() and not path.stat().st_size:
+        raise InputError(
+            f"{path} is empty. The copy failed, or the log was never written; copy it again from the craft."
+        )
     form, ready = _known(path)
     if form == "own":
         if mapping is not None and str(mapping) != "towtank":
@@ -74,6 +78,8 @@ def opened(path: Path, mapping: Path | str | LogMap | None, craft: str | Path | 
         )
     found = read_map(mapping if mapping is not None else ready)
     form = found.format or form
+    if path.is_dir() and form not in ("ros", "imc"):
+        raise InputError(f"{path} is a folder, and a log of format {form} is one file. Name the file.")
     name = str(mapping) if isinstance(mapping, str | Path) else ready or "given"
     owner = _craft(found, mapping, craft)
     channels = _numbered(found.channels, owner)

@@ -13,8 +13,7 @@ from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.tank.imported.table import Table
 
-Wanted = Mapping[str, tuple[str, ...]]
-"""Group -> columns that are asked for; "" is the group of a file with one table."""
+Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -35,6 +34,12 @@ class Group:
     def rows(self) -> int:
         """Number of rows."""
         return len(self.table.lines)
+
+    def take(self, rows: Rows) -> Group:
+        """The table with only ``rows``, in that order."""
+        texts = {name: tuple(cells[i] for i in rows) for name, cells in self.texts.items()}
+        time = None if self.time is None else self.time[rows]
+        return Group(self.table.take(rows), texts, time, self.spoilt)
 
     def cells(self, name: str) -> tuple[str, ...]:
         """A column as text."""
@@ -108,6 +113,3 @@ def table_of(title: str, names: tuple[str, ...], units: tuple[str, ...], values:
         names, units, values, np.arange(first, first + count, dtype=np.intp),
         np.array([title] * count, dtype=str) if count else np.array([], dtype=str),
     )  # fmt: skip
-
-
-Rows = NDArray[np.intp]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +34,9 @@ def read_ros(path: Path, wanted: Mapping[str, Sequence[str]], sparse: bool) -> R
     InputError
         ``rosbags`` is not installed, the bag is damaged, or it lacks a topic or a field.
     """
+    opened = _library(path)
     try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise InputError(f'{path}: reading a bag needs rosbags. Install it: pip install "towtank[field]".') from None
-    usual = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)
-    try:
-        with AnyReader([path], default_typestore=usual) as reader:
+        with opened() as reader:
             return _read(path, reader, wanted, sparse)
     except InputError:
         raise
@@ -53,15 +48,30 @@ def read_ros(path: Path, wanted: Mapping[str, Sequence[str]], sparse: bool) -> R
 
 
 def topics_of(path: Path) -> tuple[str, ...]:
-    """Topics of a bag; none where it cannot be opened."""
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
+    """Topics of a bag; none where it cannot be opened.
 
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+    Raises
+    ------
+    InputError
+        ``rosbags`` is not installed.
+    """
+    opened = _library(path)
+    try:
+        with opened() as reader:
             return tuple(connection.topic for connection in reader.connections)
     except Exception:  # as in read_ros, which tells the reason
         return ()
+
+
+def _library(path: Path) -> Callable[[], Any]:
+    """What opens the bag at ``path``; its messages are those of the usual types where it does not hold their own."""
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError(f'{path}: reading a bag needs rosbags. Install it: pip install "towtank[field]".') from None
+    usual = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)
+    return lambda: AnyReader([path], default_typestore=usual)
 
 
 def _read(path: Path, reader: Any, wanted: Mapping[str, Sequence[str]], sparse: bool) -> Raw:
@@ -73,6 +83,7 @@ def _read(path: Path, reader: Any, wanted: Mapping[str, Sequence[str]], sparse: 
     absent: dict[str, set[str]] = {topic: set() for topic in rows}
     note: dict[str, Any] = {}
     faults: list[Fault] = []
+    timed: set[str] = set()
     count = 0
     try:
         for connection, at, data in reader.messages(connections=taken):
@@ -83,17 +94,19 @@ def _read(path: Path, reader: Any, wanted: Mapping[str, Sequence[str]], sparse: 
                 continue
             fields = wanted[connection.topic]
             values = [_field(message, field, absent[connection.topic]) for field in fields]
-            rows[connection.topic].append((_stamp(message, at), values))
+            stamp = _stamp(message)
+            timed |= {connection.topic} if stamp else set()
+            rows[connection.topic].append((stamp or at, values))
     except Exception as error:  # a bag that breaks off in the middle: what came before is whole
         if not count:
             raise
         faults.append(Fault(1, f"the bag breaks off after {count} messages ({str(error).rstrip('.')})"))
-    return _raw(path, rows, wanted, absent, sparse, note, faults)
+    return _raw(path, rows, wanted, absent, sparse, note, faults, timed)
 
 
 def _raw(
     path: Path, rows: Rows, wanted: Mapping[str, Sequence[str]], absent: Mapping[str, set[str]], sparse: bool,
-    note: Mapping[str, Any], faults: list[Fault],
+    note: Mapping[str, Any], faults: list[Fault], timed: set[str],
 ) -> Raw:  # fmt: skip
     stamps = [at for found in rows.values() for at, _ in found]
     if not stamps:
@@ -113,13 +126,16 @@ def _raw(
         kept = values[:, [wanted[topic].index(name) for name in names]]
         time = np.array([(at - second * 10**9) * 1e-9 for at, _ in found])
         groups[topic] = Group(table_of(f"{path.name} {topic}", names, ("",) * len(names), kept), {}, time)
-    return Raw(path.name, groups, float(second), note, tuple(faults))
+    bare = sorted(set(groups) - timed)
+    said = ("times are the stamps of the headers" + (f", those of the bag for {', '.join(bare)}" if bare else ""),)
+    return Raw(path.name, groups, float(second), note, tuple(faults), said)
 
 
-def _stamp(message: Any, at: int) -> int:
+def _stamp(message: Any) -> int:
+    """Stamp [ns] of the header of a message; 0 where it has none."""
     stamp = getattr(getattr(message, "header", None), "stamp", None)
-    if stamp is None or not (stamp.sec or stamp.nanosec):
-        return at
+    if stamp is None:
+        return 0
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 

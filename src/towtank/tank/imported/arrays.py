@@ -67,7 +67,7 @@ def read_mat_columns(path: Path, wanted: Sequence[str]) -> Table:
                     wanted,
                     lambda name: (_of_matrix(name, path, lambda whole: np.transpose(_of_hdf(file, whole, path))), ""),
                 )
-        except (OSError, RuntimeError) as error:
+        except (OSError, RuntimeError, KeyError, ValueError, MemoryError) as error:
             raise InputError(f"{path} is not a whole MAT file ({error}). Save it again.") from None
     from scipy.io import loadmat
 
