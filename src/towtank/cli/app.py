@@ -22,6 +22,7 @@ from towtank.cli.pilot import pilot
 from towtank.cli.plan import plan
 from towtank.cli.report import report
 from towtank.cli.run import run
+from towtank.cli.sea import sea
 from towtank.cli.solve_case import solve_case
 from towtank.cli.status import status
 from towtank.cli.sweep import sweep
@@ -73,6 +74,7 @@ for _command in (
     tune,
     mc,
     faults,
+    sea,
     assess,
     sweep,
     design,
