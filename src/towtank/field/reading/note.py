@@ -24,7 +24,7 @@ def note_of(log: SeaLog) -> dict[str, Any]:
         "towtank": WORDS if log.synthetic else "record written by towtank",
         "synthetic": log.synthetic, "name": log.name, "craft": log.craft, "epoch": log.epoch,
         "datum": list(log.datum) if log.datum else None, "std": dict(log.std), "bias": dict(log.bias),
-        "assumed": list(log.assumed),
+        "assumed": list(log.assumed), "made": dict(log.provenance) if log.synthetic else None,
     }  # fmt: skip
 
 
