@@ -26,6 +26,8 @@ COMMANDS = (
     "pilot",
     "tune",
     "mc",
+    "log",
+    "sea",
     "assess",
     "report",
     "doctor",

@@ -103,3 +103,16 @@ def test_a_record_without_the_fins_of_the_craft_is_refused(model, channels, said
 def test_what_is_no_record_is_refused(time, channels, said):
     with pytest.raises(InputError, match=said):
         SeaLog("swim", "hokie", np.array(time), {k: np.array(v) for k, v in channels.items()})
+
+
+def test_the_tick_is_that_of_a_sensor_not_of_the_union_of_clocks(model):
+    # Fins and compass at 10 Hz, 3 ms apart: the union of their stamps has a step of 3 ms.
+    ticks = np.arange(0.0, 20.0, 0.1)
+    time = np.sort(np.concatenate([ticks, ticks + 0.003]))
+    even = np.isin(time, ticks)
+    fins = {f"delta{i + 1}": np.where(even, 0.1, np.nan) for i in range(4)}
+    log = SeaLog("swim", "hokie", time, {**fins, "psi": np.where(even, np.nan, 0.2)})
+    drive = drive_of(model, log)
+    assert drive.clock.tick == pytest.approx(0.1)
+    assert drive.whole.all()
+    assert np.isfinite(drive.seen["psi"]).all()

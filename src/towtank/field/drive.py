@@ -75,7 +75,7 @@ def drive_of(model: Model, log: SeaLog, *, speed: float | None = None, steps: in
     InputError
         The record holds nothing that drove the fins, or another number of them than the craft has.
     """
-    tick = float(f"{np.median(np.diff(log.time)):.9g}")
+    tick = float(f"{_usual_step(log):.9g}")
     time = log.time[0] + tick * np.arange(round((log.time[-1] - log.time[0]) / tick) + 1)
     n = len(model.craft.fins)
     names, measured = _fins_of(log, n)
@@ -120,6 +120,17 @@ def bridged(time: Array, values: Array, at: Array, hold: float = LONGEST_HOLD) -
     near = np.minimum(np.abs(at - own[after]), np.abs(at - own[after - 1])) < 1e-9
     apart = (own[after] - own[after - 1] <= hold) & (at >= own[0] - hold) & (at <= own[-1] + hold)
     return np.interp(at, own, kept), apart | near
+
+
+def _usual_step(log: SeaLog) -> float:
+    """Median time [s] between the samples of the channel that has most of them; several clocks make a finer union.
+
+    Orders that are held until the next one stand at every sample and do not count.
+    """
+    fins = [f"{word}{i + 1}" for word in ("delta", "command") for i in range(FINS)]
+    own = [name for name in (*MEASURED, *fins) if log.has(name)]
+    steps = [float(np.median(np.diff(log.time[np.isfinite(log[name])]))) for name in own]
+    return min(steps, default=float(np.median(np.diff(log.time))))
 
 
 def _fins_of(log: SeaLog, n: int) -> tuple[tuple[str, ...], bool]:

@@ -14,6 +14,7 @@ from towtank.errors import InputError
 from towtank.frames import Array
 from towtank.tank.imported.table import Table, read_bytes
 
+_COLUMN = re.compile(r"^(?P<name>.+)\(:,\s*(?P<column>\d+)\)$")
 _STEP = re.compile(r"^(?P<name>[^()]*)(?:\((?P<index>\d+)\))?$")
 Find = Callable[[str], tuple[Any, str]]
 """Name of a variable -> its values and its unit."""
@@ -47,7 +48,8 @@ def read_netcdf_columns(path: Path, wanted: Sequence[str]) -> Table:
 def read_mat_columns(path: Path, wanted: Sequence[str]) -> Table:
     """Variables ``wanted`` of a MAT file of any version; structures by dots, their elements by numbers from 1.
 
-    ``run.Fx`` is a field, ``runs(2).Fx`` that of the second element of a structure array.
+    ``run.Fx`` is a field, ``runs(2).Fx`` that of the second element of a structure array, ``run.fins(:,3)`` the third
+    column of a matrix.
 
     Raises
     ------
@@ -60,8 +62,12 @@ def read_mat_columns(path: Path, wanted: Sequence[str]) -> Table:
 
         try:
             with h5py.File(io.BytesIO(content), "r") as file:
-                return _table(path, wanted, lambda name: (_of_hdf(file, name, path), ""))
-        except (OSError, RuntimeError) as error:
+                return _table(
+                    path,
+                    wanted,
+                    lambda name: (_of_matrix(name, path, lambda whole: np.transpose(_of_hdf(file, whole, path))), ""),
+                )
+        except (OSError, RuntimeError, KeyError, ValueError, MemoryError) as error:
             raise InputError(f"{path} is not a whole MAT file ({error}). Save it again.") from None
     from scipy.io import loadmat
 
@@ -69,7 +75,21 @@ def read_mat_columns(path: Path, wanted: Sequence[str]) -> Table:
         found = loadmat(io.BytesIO(content), struct_as_record=False, squeeze_me=True)
     except Exception as error:  # scipy raises many kinds on damaged files
         raise InputError(f"{path} is not a whole MAT file ({error}). Save it again.") from None
-    return _table(path, wanted, lambda name: (_of_structure(found, name, path), ""))
+    return _table(
+        path, wanted, lambda name: (_of_matrix(name, path, lambda whole: _of_structure(found, whole, path)), "")
+    )
+
+
+def _of_matrix(name: str, path: Path, find: Callable[[str], Any]) -> Any:
+    """A variable, or one column of it."""
+    found = _COLUMN.match(name)
+    if found is None:
+        return find(name)
+    values = np.asarray(find(found["name"]))
+    columns = values.shape[1] if values.ndim == 2 else 0
+    if not 1 <= int(found["column"]) <= columns:
+        raise InputError(f"{path}: {name!r} asks for a column of {columns}; they are counted from 1.")
+    return values[:, int(found["column"]) - 1]
 
 
 def _of_structure(found: dict[str, Any], name: str, path: Path) -> Any:
