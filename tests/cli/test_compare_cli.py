@@ -17,7 +17,7 @@ from towtank.craft.library import read_craft, write_craft_copy
 from towtank.derive.derive import derive
 from towtank.derive.files import read_derivatives, write_derivatives
 from towtank.field.comparing.files import read_comparisons
-from towtank.field.files import write_log
+from towtank.field.files import read_log, write_log
 from towtank.model.equations import Model
 from towtank.model.values import replaced
 from towtank.plan.standard import standard_plan
@@ -27,6 +27,23 @@ from towtank.tank.fast.tank import FastTank
 from towtank.trials.start import ballasted
 
 runner = CliRunner()
+MAPPING = """
+schema = "towtank/sea-log/1"
+format = "csv"
+craft = "hokie"
+fins = "towtank"
+[clock]
+columns = ["time"]
+kind = "elapsed"
+unit = "s"
+[channels]
+psi = { column = "psi", unit = "rad" }
+r = { column = "r", unit = "rad/s" }
+delta1 = { column = "delta1", unit = "rad" }
+delta2 = { column = "delta2", unit = "rad" }
+delta3 = { column = "delta3", unit = "rad" }
+delta4 = { column = "delta4", unit = "rad" }
+"""
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -141,3 +158,19 @@ def test_what_cannot_be_compared_is_said(study: Path, words: tuple[str, ...], sa
 def test_a_study_without_derivatives_says_what_comes_first(tmp_path: Path, study: Path):
     _, error = answer("compare", "remus100", str(study.parent / "swim.nc"), "--out", str(tmp_path / "empty"), code=2)
     assert "towtank derive" in error
+
+
+def test_a_log_of_another_form_is_read_on_the_way(study: Path, tmp_path: Path):
+    log = read_log(study.parent / "swim.nc")
+    names = ("psi", "r", "delta1", "delta2", "delta3", "delta4")
+    rows = np.stack([log.time, *(log[name] for name in names)], axis=1)
+    np.savetxt(tmp_path / "swim.csv", rows, delimiter=",", header="time," + ",".join(names), comments="", fmt="%.9f")
+    (tmp_path / "map.toml").write_text(MAPPING)
+    told, _ = answer(
+        "compare", str(study), str(tmp_path / "swim.csv"), "--map", str(tmp_path / "map.toml"), "--ballasted",
+        "--samples", "5", "--speed", "1 m/s",
+    )  # fmt: skip
+    assert told["summary"]["record_level"] == "sea record"
+    # No speed is in the file: the craft's own at the begin leaves some degrees after half a minute.
+    assert told["summary"]["channels"]["psi"]["rms"] < 0.2
+    assert any("u: not measured" in words for one in read_comparisons(study) for words in one.words)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,7 +22,11 @@ StudyWord = Annotated[
     str, typer.Argument(metavar="STUDY", help="A study folder, or a craft whose folder is here.", show_default=False)
 ]
 Record = Annotated[
-    Path, typer.Argument(metavar="LOG", help="A record, such as one of towtank log.", show_default=False)
+    Path, typer.Argument(metavar="LOG", help="A record of towtank log, or any log that it reads.", show_default=False)
+]
+Map = Annotated[
+    str | None,
+    typer.Option("--map", metavar="MAPPING", show_default=False, help="As for towtank log. Default: told by the file."),
 ]
 Closed = Annotated[
     bool | None,
@@ -55,6 +58,7 @@ Align = Annotated[
 def compare(
     study: StudyWord,
     log: Record,
+    mapping: Map = None,
     closed: Closed = None,
     horizon: Horizon = None,
     pilot: PilotWord = None,
@@ -77,26 +81,18 @@ def compare(
     """
     with answering("compare", json, debug) as reply:
         chain = open_chain(reply, study, out).keep_speed()
-        record = _read(log, reply)
+        record = _read(log, mapping, reply)
         model = _model(chain, record, ballasted)
         found = _compared(reply, model, record, closed, horizon, pilot, speed, samples, align)
         _write(chain, found)
         _tell(reply, found)
 
 
-def _read(path: Path, reply: Reply) -> SeaLog:
-    """A record of towtank, or of another form where the readers take it."""
-    from towtank.field.files import read_log
+def _read(path: Path, mapping: str | None, reply: Reply) -> SeaLog:
+    """A record of towtank, or a log of another form through the readers; what is doubtful is remarked."""
+    from towtank.field.reading import read_sea_log
 
-    if path.suffix == ".nc":
-        return read_log(path)
-    try:
-        reading = import_module("towtank.field.reading")
-    except ImportError:
-        raise InputError(
-            f"{path}: a record is read from .nc, as towtank log and towtank sea write it. Turn the file into one first."
-        ) from None
-    record: SeaLog = reading.read_sea_log(path)
+    record = read_sea_log(path, mapping)
     for flag in record.flags:
         reply.log(f"  {flag.kind} of {flag.channel}, {flag.start:.4g} to {flag.end:.4g} s: {flag.words}")
     return record
