@@ -28,6 +28,7 @@ COMMANDS = (
     "mc",
     "log",
     "sea",
+    "compare",
     "assess",
     "report",
     "doctor",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from towtank.engine.loop import channels, observed
 from towtank.errors import InputError
 from towtank.frames import Array
-from towtank.pilot.orders import Orders
+from towtank.pilot.orders import ORDERS, Orders
 
 MOST_GAUGES = 32
 
@@ -121,7 +121,7 @@ def leg_table(legs: Sequence[Leg], fins: int) -> Array:
         raise InputError("run: no leg to run. Give at least one.")
     rows = []
     for leg in legs:
-        orders = [float(x) for x in astuple(leg.orders)]
+        orders = [float(getattr(leg.orders, name)) for name in ORDERS]
         if not (leg.within > 0.0 and np.isfinite(leg.within)):
             raise InputError(f"leg {leg.name}: within {leg.within:g} s. Give a positive, finite duration.")
         if not np.all(np.isfinite(orders)):

@@ -64,7 +64,8 @@ def drive_of(model: Model, log: SeaLog, *, speed: float | None = None, steps: in
 
     Parameters
     ----------
-    speed [m/s] : set speed, whose thrust the throttle multiplies; the median of the record when left out.
+    speed [m/s] : set speed, whose thrust the throttle multiplies; when left out the median of the
+        speed ordered, else of that measured.
     steps : RK4 steps in a tick; as many as keep a step below the model's usual one when left out.
 
     Source     Fins that follow the record exactly: the angle asked in a tick undoes the lag of the actuator,
@@ -205,8 +206,8 @@ def _thrust(model: Model, log: SeaLog, time: Array, speed: float | None) -> tupl
 
 
 def _median_speed(model: Model, log: SeaLog) -> float:
-    """Median speed [m/s] of the record; that of the craft where none was measured."""
-    for name in ("ahead", "u", "speed", "speed_order"):
+    """Median of the speed ordered, else of the speed measured [m/s]; that of the craft where the record has neither."""
+    for name in ("speed_order", "ahead", "u", "speed"):
         if log.has(name):
             return float(np.nanmedian(log[name]))
     return float(model.craft.speed)

@@ -27,7 +27,7 @@ class Uncertainty:
     def total(self) -> float:
         """U_val.
 
-        Source     asmevv20, eq. 1-5-9: the root of the sum of squares.
+        Source     asmevv20: the root of the sum of squares.
         """
         return float(np.sqrt(self.input**2 + self.numerical**2 + self.data**2))
 
@@ -53,7 +53,7 @@ class Score:
     def error(self) -> float:
         """E, record less model.
 
-        Source     ittc75030101, E = D - S.
+        Source     ittc75030101, eq. 5: E = D - S.
         """
         return self.record - self.model
 
