@@ -1,0 +1,266 @@
+"""The most likely coefficients, motions and waters of several records together: Gauss-Newton on all unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from functools import reduce
+from typing import TypeVar
+
+import numpy as np
+
+from towtank.errors import InputError, TowtankError
+from towtank.field.calibrate.noise import Links, Noise, learned, links_of, noise_of
+from towtank.field.calibrate.normal import Equations, Prior, cost, counted, equations, prior_of, spread
+from towtank.field.calibrate.settings import Settings
+from towtank.field.calibrate.shoot import CHUNK, Engine, Piece, Point
+from towtank.field.calibrate.unknowns import Unknowns
+from towtank.field.calibrate.windows import Windows
+from towtank.frames import Array
+from towtank.parallel import cores
+from towtank.progress import Progress
+
+T = TypeVar("T")
+HALVINGS = 8
+"""Times that a step is halved before the search ends where it is."""
+SETTLED = 0.02
+"""Change of a standard deviation of the noise, as a share, below which it is found."""
+SUMMED = ("gg", "g", "square")
+"""Fields of ``Piece`` that are sums over the windows."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A record ready to be fitted."""
+
+    windows: Windows
+    engine: Engine
+    links: Links
+    prior: Prior
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a search stands in one record. expected : sums of squares are expected to be as large as these (see
+    ``chi``).
+    """
+
+    point: Point
+    noise: Noise
+    piece: Piece
+    equations: Equations
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The most likely unknowns.
+
+    z (k,), covariance (k, k) : of the coefficients, in the scale of ``Unknowns``.   found : of each record.
+    shared : record -> covariance (G, G) of z and what lasts the record.   costs : after each round.
+    gain : what the next step was expected to take off.   settled : whether the search ended by itself.
+    """
+
+    unknowns: Unknowns
+    cases: tuple[Case, ...]
+    z: Array
+    covariance: Array
+    found: tuple[Found, ...]
+    shared: tuple[Array, ...]
+    costs: tuple[float, ...]
+    gain: float
+    settled: bool
+
+
+def case_of(windows: Windows, names: tuple[str, ...], settings: Settings) -> Case:
+    """``windows`` with the engine that flies them. names : parameters of the engine that move."""
+    return Case(windows, Engine(windows, names), links_of(windows, settings), prior_of(windows, settings))
+
+
+class Crew:
+    """Threads that share the windows of all records; the engine and the products run outside Python."""
+
+    def __init__(self, threads: int | None = None) -> None:
+        self.pool = ThreadPoolExecutor(threads or cores())
+
+    def each(self, works: Sequence[Callable[[], T]]) -> list[T]:
+        """Results of ``works``, in order. After an interruption those not begun are dropped."""
+        futures = [self.pool.submit(work) for work in works]
+        try:
+            return [future.result() for future in futures]
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
+
+    def close(self) -> None:
+        """Let the threads go."""
+        self.pool.shutdown(wait=True, cancel_futures=True)
+
+
+def gathered(crew: Crew, cases: Sequence[Case], unknowns: Unknowns, z: Array, points: Sequence[Point]) -> list[Piece]:
+    """The pieces of all records about ``points``."""
+    columns, values = unknowns.columns, unknowns.values(z)
+    works: list[Callable[[], Piece]] = []
+    counts = []
+    for case, point in zip(cases, points, strict=True):
+        common = case.engine.common(values)
+        spans = [slice(a, min(a + CHUNK, len(point.states))) for a in range(0, len(point.states), CHUNK)]
+        counts.append(len(spans))
+        works += [
+            lambda case=case, point=point, common=common, span=span: case.engine.gather(common, point, span, columns)
+            for span in spans
+        ]
+    parts, out = crew.each(works), []
+    for count in counts:
+        out.append(_joined(parts[:count]))
+        parts = parts[count:]
+    return out
+
+
+def _joined(parts: Sequence[Piece]) -> Piece:
+    def one(name: str) -> Array:
+        arrays = [getattr(part, name) for part in parts]
+        return reduce(np.add, arrays) if name in SUMMED else np.concatenate(arrays)
+
+    return Piece(**{field.name: one(field.name) for field in fields(Piece)})
+
+
+class Search:
+    """A search under way: where it is, and the noise of each record."""
+
+    def __init__(self, cases: Sequence[Case], unknowns: Unknowns, settings: Settings, crew: Crew) -> None:
+        self.cases, self.unknowns, self.settings, self.crew = tuple(cases), unknowns, settings, crew
+        self.z = np.zeros(unknowns.size)
+        self.points = [Point(c.windows.guess.copy(), c.prior.centre.copy()) for c in cases]
+        self.first = noise_of(settings)
+        self.noise = [self.first] * len(cases)
+        self.pieces = gathered(crew, cases, unknowns, self.z, self.points)
+        self.moved = np.inf
+
+    def cost(self, z: Array, points: Sequence[Point], pieces: Sequence[Piece]) -> float:
+        """Cost of all records and of the prior of the coefficients."""
+        return float(z @ z) + sum(
+            cost(c.windows, c.links, noise, c.prior, point, piece.end, piece.square)
+            for c, noise, point, piece in zip(self.cases, self.noise, points, pieces, strict=True)
+        )
+
+    def equations(self) -> list[Equations]:
+        """Normal equations of each record, solved for its windows."""
+
+        def one(i: int) -> Equations:
+            case, k = self.cases[i], self.unknowns.size
+            out = equations(case.windows, case.links, self.noise[i], case.prior, self.points[i], self.pieces[i], k)
+            out.told
+            return out
+
+        return self.crew.each([lambda i=i: one(i) for i in range(len(self.cases))])
+
+    def step(self, all_of: Sequence[Equations]) -> tuple[Array, list[tuple[Array, Array]], float]:
+        """Gauss-Newton step of z and of each record, and half of what it is expected to take off the cost."""
+        k = self.unknowns.size
+        a, b = np.eye(k), -self.z
+        for it in all_of:
+            a, b = a + it.told[0], b + it.told[1]
+        dz = np.linalg.solve(a, b)
+        backs = [it.back(dz) for it in all_of]
+        gain = -float(self.z @ dz)
+        for it, (shared, states) in zip(all_of, backs, strict=True):
+            gain += float(it.g @ np.concatenate([dz, shared])) + float((it.s * states).sum())
+        return dz, backs, gain
+
+    def advance(self, dz: Array, backs: Sequence[tuple[Array, Array]], now: float) -> float | None:
+        """Take the step, or the largest half of it that lowers the cost; the new cost, None where none does."""
+        share = 1.0
+        for _ in range(HALVINGS):
+            z = self.z + share * dz
+            points = [
+                Point(point.states + share * states, point.shared + share * shared)
+                for point, (shared, states) in zip(self.points, backs, strict=True)
+            ]
+            try:
+                pieces = gathered(self.crew, self.cases, self.unknowns, z, points)
+                value = self.cost(z, points, pieces)
+            except (TowtankError, np.linalg.LinAlgError):
+                value = np.inf
+            if value <= now * (1.0 + 1e-12):
+                self.z, self.points, self.pieces = z, points, pieces
+                return value
+            share *= 0.5
+        return None
+
+    def learn(self, all_of: Sequence[Equations]) -> None:
+        """Take the noise of each record from what its links miss."""
+        a = np.linalg.inv(np.eye(self.unknowns.size) + sum(it.told[0] for it in all_of))
+
+        def one(i: int) -> Noise:
+            case, point, piece, noise = self.cases[i], self.points[i], self.pieces[i], self.noise[i]
+            found = spread(case.windows, case.links, piece, all_of[i], shared_of(all_of[i], a))
+            squares, free = counted(case.windows, case.links, noise, point, piece.end, found)
+            return learned(noise, self.first, squares, free)
+
+        new = self.crew.each([lambda i=i: one(i) for i in range(len(self.cases))])
+        ratios = [np.abs(0.5 * np.log(b.scales / a.scales)).max() for a, b in zip(self.noise, new, strict=True)]
+        self.moved, self.noise = float(max(ratios)), new
+
+
+def shared_of(it: Equations, covariance: Array) -> Array:
+    """Covariance (G, G) of z and what lasts a record, from that of z (k, k)."""
+    a, _ = it.reduced
+    k = it.k
+    own = np.linalg.inv(a[k:, k:])
+    gain = own @ a[k:, :k]
+    cross = -gain @ covariance
+    return np.block([[covariance, cross.T], [cross, own + gain @ covariance @ gain.T]])
+
+
+def fit(
+    cases: Sequence[Case], unknowns: Unknowns, settings: Settings, progress: Progress, threads: int | None = None
+) -> Fit:
+    """The most likely unknowns of ``cases`` together.
+
+    Source     bock1983 (multiple shooting), with weights on what the windows miss of each other: the maximum a
+               posteriori of a model with process noise (weak constraint, tremolet2006).
+    Departure  Windows are eliminated before the coefficients (Schur complement), each record apart.
+    """
+    if not cases:
+        raise InputError("calibrate: no record was given. Name one log or more.")
+    crew = Crew(threads)
+    progress.start("calibration", settings.rounds)
+    try:
+        search = Search(cases, unknowns, settings, crew)
+        found = _searched(search, settings, progress)
+    finally:
+        crew.close()
+    progress.done("calibration")
+    return found
+
+
+def _searched(search: Search, settings: Settings, progress: Progress) -> Fit:
+    costs = [search.cost(search.z, search.points, search.pieces)]
+    settled, gain = False, np.inf
+    for number in range(settings.rounds + 1):
+        all_of = search.equations()
+        dz, backs, gain = search.step(all_of)
+        # The noise is looked for once the motion lies near the record: before, what is missed is the search's own.
+        if settings.learn and number > 1:
+            search.learn(all_of)
+            all_of = search.equations()
+            dz, backs, gain = search.step(all_of)
+        found = not settings.learn or search.moved < SETTLED
+        settled = gain < settings.tolerance and found
+        if settled or number == settings.rounds:
+            break
+        value = search.advance(dz, backs, search.cost(search.z, search.points, search.pieces))
+        if value is None:
+            break
+        costs.append(value)
+        progress.step("calibration", f"cost {value:.6g}")
+    covariance = np.linalg.inv(np.eye(search.unknowns.size) + sum(it.told[0] for it in all_of))
+    return Fit(
+        search.unknowns, search.cases, search.z, 0.5 * (covariance + covariance.T),
+        tuple(
+            Found(*parts) for parts in zip(search.points, search.noise, search.pieces, all_of, strict=True)
+        ),
+        tuple(shared_of(it, covariance) for it in all_of), tuple(costs), gain, settled,
+    )  # fmt: skip
