@@ -12,7 +12,17 @@ import numpy as np
 
 from towtank.errors import InputError, TowtankError
 from towtank.field.calibrate.noise import Links, Noise, learned, links_of, noise_of
-from towtank.field.calibrate.normal import Equations, Prior, cost, counted, equations, prior_of, spread
+from towtank.field.calibrate.normal import (
+    Equations,
+    Prior,
+    cost,
+    counted,
+    equations,
+    expected,
+    missed,
+    prior_of,
+    spread,
+)
 from towtank.field.calibrate.settings import Settings
 from towtank.field.calibrate.shoot import CHUNK, Engine, Piece, Point
 from towtank.field.calibrate.unknowns import Unknowns
@@ -24,8 +34,10 @@ from towtank.progress import Progress
 T = TypeVar("T")
 HALVINGS = 8
 """Times that a step is halved before the search ends where it is."""
-SETTLED = 0.02
-"""Change of a standard deviation of the noise, as a share, below which it is found."""
+SETTLED = 0.2
+"""Step of the noise, as a share of what the records tell of it, below which it is found."""
+LOOKS = 4
+"""Steps of the noise in a round of the search, which cost less than to fly the windows once."""
 SUMMED = ("gg", "g", "square")
 """Fields of ``Piece`` that are sums over the windows."""
 
@@ -136,7 +148,6 @@ class Search:
         self.first = noise_of(settings)
         self.noise = [self.first] * len(cases)
         self.pieces = gathered(crew, cases, unknowns, self.z, self.points)
-        self.moved = np.inf
 
     def cost(self, z: Array, points: Sequence[Point], pieces: Sequence[Piece]) -> float:
         """Cost of all records and of the prior of the coefficients."""
@@ -189,19 +200,24 @@ class Search:
             share *= 0.5
         return None
 
-    def learn(self, all_of: Sequence[Equations]) -> None:
-        """Take the noise of each record from what its links miss."""
-        a = np.linalg.inv(np.eye(self.unknowns.size) + sum(it.told[0] for it in all_of))
+    def learn(self, all_of: Sequence[Equations]) -> bool:
+        """Take the noise of each record from what its links are expected to miss after the step; True when found."""
+        k = self.unknowns.size
+        covariance = np.linalg.inv(np.eye(k) + sum(it.told[0] for it in all_of))
+        dz, backs, _ = self.step(all_of)
 
-        def one(i: int) -> Noise:
-            case, point, piece, noise = self.cases[i], self.points[i], self.pieces[i], self.noise[i]
-            found = spread(case.windows, case.links, piece, all_of[i], shared_of(all_of[i], a))
-            squares, free = counted(case.windows, case.links, noise, point, piece.end, found)
-            return learned(noise, self.first, squares, free)
+        def one(i: int) -> tuple[Noise, float]:
+            case, point, piece, noise, it = self.cases[i], self.points[i], self.pieces[i], self.noise[i], all_of[i]
+            shared, states = backs[i]
+            gone = missed(case.windows, case.links, point, piece.end)
+            gone = expected(case.windows, case.links, gone, piece, states, np.concatenate([dz, shared]))
+            found = spread(case.windows, case.links, piece, it, shared_of(it, covariance))
+            counts = counted(case.windows, case.links, noise, gone, point.states + states, found)
+            return learned(noise, self.first, *counts)
 
         new = self.crew.each([lambda i=i: one(i) for i in range(len(self.cases))])
-        ratios = [np.abs(0.5 * np.log(b.scales / a.scales)).max() for a, b in zip(self.noise, new, strict=True)]
-        self.moved, self.noise = float(max(ratios)), new
+        self.noise = [noise for noise, _ in new]
+        return max(moved for _, moved in new) < SETTLED
 
 
 def shared_of(it: Equations, covariance: Array) -> Array:
@@ -238,17 +254,17 @@ def fit(
 
 def _searched(search: Search, settings: Settings, progress: Progress) -> Fit:
     costs = [search.cost(search.z, search.points, search.pieces)]
-    settled, gain = False, np.inf
+    settled, gain, learning = False, np.inf, settings.learn
     for number in range(settings.rounds + 1):
         all_of = search.equations()
         dz, backs, gain = search.step(all_of)
         # The noise is looked for once the motion lies near the record: before, what is missed is the search's own.
-        if settings.learn and number > 1:
-            search.learn(all_of)
-            all_of = search.equations()
-            dz, backs, gain = search.step(all_of)
-        found = not settings.learn or search.moved < SETTLED
-        settled = gain < settings.tolerance and found
+        for _ in range(LOOKS if learning and number > 1 else 0):
+            if learning:
+                learning = not search.learn(all_of)
+                all_of = search.equations()
+                dz, backs, gain = search.step(all_of)
+        settled = gain < settings.tolerance and not learning
         if settled or number == settings.rounds:
             break
         value = search.advance(dz, backs, search.cost(search.z, search.points, search.pieces))

@@ -14,6 +14,8 @@ MOTION = 12
 LINEAR, ANGULAR = [0, 1, 2, 6, 7, 8], [3, 4, 5, 9, 10, 11]
 """Places of position and velocity, of attitude and rates."""
 WATER = slice(MOTION, len(STATES))
+HURRY = 1.5
+"""Power of the factor of a step: the repeated rule comes near its end by constant shares."""
 LEAST, MOST = 1e-4, 1e4
 """Factors by which a density may leave its starting value in all."""
 
@@ -92,15 +94,19 @@ def _euler(angles: Array) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def learned(now: Noise, first: Noise, squares: Array, free: Array) -> Noise:
-    """The noise of largest evidence, one step on.
+def learned(now: Noise, first: Noise, squares: Array, free: Array) -> tuple[Noise, float]:
+    """The noise of largest evidence, one step on; and the step over what the record tells of the noise.
 
     squares (3,) : of what each kind of link misses, over its present variance.   free (3,) : how many of its links are
-    free of the unknowns: their number less what the unknowns fit of them.
+    free of the unknowns: their number less what the unknowns fit of them. A variance of ``free`` numbers is known to a
+    share of root 2 / free.
 
     Source     mackay1992, eq. 4.9: variance = squares / free, repeated.
     Valid      Within ``LEAST`` and ``MOST`` of the values at the start.
     """
-    factor = np.where(free > 0.0, squares / np.maximum(free, 1e-9), 1.0)
-    scales = np.clip(now.scales * np.clip(factor, 0.05, 20.0), LEAST * first.scales, MOST * first.scales)
-    return replace(now, push=float(scales[0]), twist=float(scales[1]), water=float(scales[2]))
+    count = np.maximum(free, 1e-9)
+    factor = np.where(free > 0.0, np.clip((squares / count) ** HURRY, 0.02, 50.0), 1.0)
+    scales = np.clip(now.scales * factor, LEAST * first.scales, MOST * first.scales)
+    moved = np.abs(np.log(scales / now.scales)) * np.sqrt(0.5 * count)
+    new = replace(now, push=float(scales[0]), twist=float(scales[1]), water=float(scales[2]))
+    return new, float(moved.max())

@@ -52,6 +52,17 @@ def missed(windows: Windows, links: Links, point: Point, end: Array) -> Missed:
     return Missed(np.where(on, motion, 0.0), np.where(on, water, 0.0))
 
 
+def expected(
+    windows: Windows, links: Links, gone: Missed, piece: Piece, states: Array, g: Array
+) -> Missed:
+    """What is expected to be missed after steps of the windows ``states`` (W, 15) and of ``g`` (G,), to first order."""
+    after = np.roll(states, -1, axis=0)
+    motion = (piece.end_s @ states[..., None])[..., 0] + piece.end_g @ g - after[:, :MOTION]
+    water = links.keep[:, None] * states[:, WATER] - after[:, WATER]
+    on = windows.linked[:, None]
+    return Missed(gone.motion + np.where(on, motion, 0.0), gone.water + np.where(on, water, 0.0))
+
+
 def begins(windows: Windows) -> Array:
     """1 for the windows (W,) in which a stretch begins."""
     return np.concatenate([[1.0], 1.0 - windows.linked[:-1]])
@@ -210,10 +221,13 @@ def spread(windows: Windows, links: Links, piece: Piece, it: Equations, shared: 
 
 
 def counted(
-    windows: Windows, links: Links, noise: Noise, point: Point, end: Array, found: Spread
+    windows: Windows, links: Links, noise: Noise, gone: Missed, states: Array, found: Spread
 ) -> tuple[Array, Array]:
-    """Of each kind of link (push, twist, water): squares (3,) of what is missed, and how many are free (3,)."""
-    gone, on = missed(windows, links, point, end), windows.linked
+    """Of each kind of link (push, twist, water): squares (3,) of what is missed, and how many are free (3,).
+
+    states (W, 15) : where ``gone`` is missed.
+    """
+    on = windows.linked
     squares, free = np.zeros(3), np.zeros(3)
     for kind, (places, inverse, scale) in enumerate(
         ((LINEAR, links.linear, noise.push), (ANGULAR, links.angular, noise.twist))
@@ -223,7 +237,7 @@ def counted(
         part = found.link[on][:, np.array(places)[:, None], places]
         free[kind] = len(places) * on.sum() - np.einsum("wij,wji->", inverse[on], part) / scale
     first = begins(windows) > 0.0
-    start, at = point.states[first][:, WATER], np.arange(MOTION, N)
+    start, at = states[first][:, WATER], np.arange(MOTION, N)
     inverse = links.water(noise)[:, None]
     squares[2] = (inverse * gone.water**2)[on].sum() + (start**2).sum() / noise.water
     free[2] = 3.0 * (on.sum() + first.sum()) - (inverse * found.water)[on].sum()

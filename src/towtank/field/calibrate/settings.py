@@ -41,7 +41,7 @@ class Settings:
     told : a coefficient is told by the record when its standard deviation falls below this share of the prior's.
     """
 
-    window: float = 2.0
+    window: float = 1.0
     current: float = 0.5
     upwelling: float = 0.05
     turbulence: float = 0.02
