@@ -173,10 +173,7 @@ class Turn:
         e, it = self.engine, self.engine.windows
         params, k, biased = e.params, self.columns.shape[1], it.biased
         m, count = len(SHARED) + len(biased), len(square)
-        B = np.zeros((params, k + len(SHARED)))
-        B[: len(e.names), :k] = self.columns
-        B[len(e.names) :, k:] = np.diag([it.drive.thrust, 1.0, 1.0, 1.0])
-        Q = self._angles()
+        B, Q = self._parameters(), self._angles()
         inner = k + len(SHARED)
         gg, g = np.zeros((k + m, k + m)), np.zeros(k + m)
         gg[:inner, :inner] = B.T @ square[:, :params, :params].sum(axis=0) @ B
@@ -201,6 +198,30 @@ class Turn:
         end_s[:, range(3), range(3)] += 1.0
         end_g[:, :, :inner] = last[:, :, :params] @ B
         return Piece(ss, sg, s, gg, g, end, end_s, end_g, left)
+
+    def rows(self, tangent: Array, weight: Array) -> tuple[Array, Array]:
+        """Whitened slopes of all measurements: to the states (w, n, C, 15) and to g (w, n, C, G).
+
+        tangent (w, n, C, D), weight (w, n, C) : as for the products.
+        """
+        e, biased = self.engine, self.engine.windows.biased
+        B = self._parameters()
+        s = tangent @ self._angles()[:, None]
+        for i in range(3):
+            s[:, :, i, i] += weight[:, :, i]
+        g = np.zeros((*tangent.shape[:3], B.shape[1] + len(biased)))
+        g[..., : B.shape[1]] = tangent[..., : e.params] @ B
+        for i, place in enumerate(biased):
+            g[:, :, place, B.shape[1] + i] = weight[:, :, place]
+        return s, g
+
+    def _parameters(self) -> Array:
+        """Change (P, k + 4) of the engine's parameters per unit of z, of the thrust's factor and of the current."""
+        e, k = self.engine, self.columns.shape[1]
+        B = np.zeros((e.params, k + len(SHARED)))
+        B[: len(e.names), :k] = self.columns
+        B[len(e.names) :, k:] = np.diag([e.windows.drive.thrust, 1.0, 1.0, 1.0])
+        return B
 
     def _angles(self) -> Array:
         """Change (w, D, 15) of the engine's directions per state of a window."""
