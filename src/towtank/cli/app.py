@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from towtank.cli.assess import assess
+from towtank.cli.calibrate import calibrate
 from towtank.cli.check import check
 from towtank.cli.check_coefficients import check_coefficients
 from towtank.cli.derive import derive
@@ -75,6 +76,7 @@ for _command in (
     assess,
     sweep,
     design,
+    calibrate,
     report,
     doctor,
 ):

@@ -1,1 +1,1 @@
-"""Correction of a coefficient set by records of the sea: the most likely set, what it rests on, and what is not told."""
+"""Coefficients corrected by records of the sea: the most likely set, what it rests on, and what is not told."""

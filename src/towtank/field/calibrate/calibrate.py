@@ -78,8 +78,8 @@ def calibrate(
     free = unknowns(model.derivatives, terms)
     if not len(free.chosen):
         raise InputError(
-            f"calibrate: none of {', '.join(terms or ())} has an uncertainty in the prior, so no record can move it. Choose "
-            "others, or state an error (towtank.field.calibrate.unknowns.with_errors)."
+            f"calibrate: none of {', '.join(terms or ())} has an uncertainty in the prior, so no record can move it. "
+            "Choose others, or state an error (towtank.field.calibrate.unknowns.with_errors)."
         )
     found = fit([case_of(windows_of(model, log, settings), free.names, settings) for log in logs], free, settings,
                 progress, threads)  # fmt: skip
@@ -91,9 +91,7 @@ def calibrate(
     return _with(out, held, settings)
 
 
-def _held(
-    old: Model, new: Model, log: SeaLog, horizon: float, settings: Settings, threads: int | None
-) -> HoldOut:
+def _held(old: Model, new: Model, log: SeaLog, horizon: float, settings: Settings, threads: int | None) -> HoldOut:
     """Both models on a record; the thrust that the throttle multiplies is that of the old one for both."""
     from towtank.field.drive import drive_of
 
@@ -108,8 +106,8 @@ def _refuse(model: Model, logs: Sequence[SeaLog]) -> None:
     for log in logs:
         if log.craft and log.craft != model.craft.name:
             raise InputError(
-                f"log {log.name} is of {log.craft!r}, the model of {model.craft.name!r}. One craft's record says nothing of "
-                "another's derivatives. If it is the same craft, name it so in the mapping of the record."
+                f"log {log.name} is of {log.craft!r}, the model of {model.craft.name!r}. One craft's record "
+                "says nothing of another's derivatives. If it is the same craft, name it so in the mapping of the record."
             )
         known = log_hash(log)
         if known in used:
@@ -184,11 +182,10 @@ def _directions(free: Unknowns, covariance: Array) -> tuple[Direction, ...]:
 def _record(found: Fit, number: int, table: dict[str, dict[str, float]]) -> RecordTable:
     it, here, C = found.cases[number].windows, found.found[number], found.shared[number]
     std = np.sqrt(np.diag(C)[found.unknowns.size :])
-    shared = {
-        name: (float(v), float(s)) for name, v, s in zip(it.shared, here.point.shared, std, strict=True)
-    }
-    noise = {"turbulence": float(np.sqrt(here.noise.water)), "push": here.noise.push, "twist": here.noise.twist}
+    shared = {name: (float(v), float(s)) for name, v, s in zip(it.shared, here.point.shared, std, strict=True)}
+    n = here.noise
+    noise = {"turbulence": n.level**0.5, "turbulence_down": n.down**0.5, "push": n.push, "twist": n.twist}
     return RecordTable(
-        it.log.name, it.log.level, log_hash(it.log), float(it.ticks.sum() * it.drive.clock.tick), len(it.first), it.left_out,
-        it.assumed, shared, noise, table,
+        it.log.name, it.log.level, log_hash(it.log), float(it.ticks.sum() * it.drive.clock.tick), len(it.first),
+        it.left_out, it.assumed, shared, noise, table,
     )  # fmt: skip

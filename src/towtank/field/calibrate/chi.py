@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def leverage(fit: Fit, number: int, crew: Crew) -> Array:
 
     total = len(found.point.states)
     spans = [slice(a, min(a + CHUNK, total)) for a in range(0, total, CHUNK)]
-    return np.asarray(sum(crew.each([lambda span=span: one(span) for span in spans])))
+    return np.asarray(sum(crew.each([partial(one, span) for span in spans])))
 
 
 def tables(fit: Fit, threads: int | None = None) -> tuple[dict[str, dict[str, float]], ...]:

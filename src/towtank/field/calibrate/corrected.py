@@ -1,4 +1,4 @@
-"""The set of derivatives after a calibration: values, parts of the covariance, slopes at the origin, where it is from."""
+"""The set of derivatives after a calibration: values, covariance by parts, slopes at the origin, where it is from."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from towtank.provenance import provenance
 class Posterior:
     """Independent terms and slopes after a fit. terms (k,), slopes (p,).
 
-    parts : "fit", "mesh", "model" -> covariance (k, k) of the terms.   own (p, p), with_terms (p, k) : covariance of the
-    slopes, and of slopes with terms.
+    parts : "fit", "mesh", "model" -> covariance (k, k) of the terms.   own (p, p), with_terms (p, k) : covariance of
+    the slopes, and of slopes with terms.
     """
 
     terms: Array
@@ -79,7 +79,12 @@ def log_hash(log: SeaLog) -> str:
 
 
 def corrected(
-    unknowns: Unknowns, z: Array, covariance: Array, logs: Sequence[SeaLog], told: Sequence[str], quality: dict[str, Any]
+    unknowns: Unknowns,
+    z: Array,
+    covariance: Array,
+    logs: Sequence[SeaLog],
+    told: Sequence[str],
+    quality: dict[str, Any],
 ) -> Derivatives:
     """The prior's set, corrected. told : terms that the records speak of.   quality : what is said of the calibration.
 

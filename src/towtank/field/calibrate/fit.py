@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from functools import reduce
+from functools import partial, reduce
 from typing import TypeVar
 
 import numpy as np
@@ -54,9 +54,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Found:
-    """Where a search stands in one record. expected : sums of squares are expected to be as large as these (see
-    ``chi``).
-    """
+    """Where a search stands in one record."""
 
     point: Point
     noise: Noise
@@ -119,10 +117,7 @@ def gathered(crew: Crew, cases: Sequence[Case], unknowns: Unknowns, z: Array, po
         common = case.engine.common(values)
         spans = [slice(a, min(a + CHUNK, len(point.states))) for a in range(0, len(point.states), CHUNK)]
         counts.append(len(spans))
-        works += [
-            lambda case=case, point=point, common=common, span=span: case.engine.gather(common, point, span, columns)
-            for span in spans
-        ]
+        works += [partial(case.engine.gather, common, point, span, columns) for span in spans]
     parts, out = crew.each(works), []
     for count in counts:
         out.append(_joined(parts[:count]))
@@ -162,10 +157,10 @@ class Search:
         def one(i: int) -> Equations:
             case, k = self.cases[i], self.unknowns.size
             out = equations(case.windows, case.links, self.noise[i], case.prior, self.points[i], self.pieces[i], k)
-            out.told
+            _ = out.told  # solved here, in this thread
             return out
 
-        return self.crew.each([lambda i=i: one(i) for i in range(len(self.cases))])
+        return self.crew.each([partial(one, i) for i in range(len(self.cases))])
 
     def step(self, all_of: Sequence[Equations]) -> tuple[Array, list[tuple[Array, Array]], float]:
         """Gauss-Newton step of z and of each record, and half of what it is expected to take off the cost."""
@@ -173,7 +168,7 @@ class Search:
         a, b = np.eye(k), -self.z
         for it in all_of:
             a, b = a + it.told[0], b + it.told[1]
-        dz = np.linalg.solve(a, b)
+        dz = np.asarray(np.linalg.solve(a, b))
         backs = [it.back(dz) for it in all_of]
         gain = -float(self.z @ dz)
         for it, (shared, states) in zip(all_of, backs, strict=True):
@@ -203,7 +198,7 @@ class Search:
     def learn(self, all_of: Sequence[Equations]) -> bool:
         """Take the noise of each record from what its links are expected to miss after the step; True when found."""
         k = self.unknowns.size
-        covariance = np.linalg.inv(np.eye(k) + sum(it.told[0] for it in all_of))
+        covariance = np.asarray(np.linalg.inv(np.eye(k) + sum(it.told[0] for it in all_of)))
         dz, backs, _ = self.step(all_of)
 
         def one(i: int) -> tuple[Noise, float]:
@@ -215,7 +210,7 @@ class Search:
             counts = counted(case.windows, case.links, noise, gone, point.states + states, found)
             return learned(noise, self.first, *counts)
 
-        new = self.crew.each([lambda i=i: one(i) for i in range(len(self.cases))])
+        new = self.crew.each([partial(one, i) for i in range(len(self.cases))])
         self.noise = [noise for noise, _ in new]
         return max(moved for _, moved in new) < SETTLED
 
@@ -272,7 +267,7 @@ def _searched(search: Search, settings: Settings, progress: Progress) -> Fit:
             break
         costs.append(value)
         progress.step("calibration", f"cost {value:.6g}")
-    covariance = np.linalg.inv(np.eye(search.unknowns.size) + sum(it.told[0] for it in all_of))
+    covariance = np.asarray(np.linalg.inv(np.eye(search.unknowns.size) + sum(it.told[0] for it in all_of)))
     return Fit(
         search.unknowns, search.cases, search.z, 0.5 * (covariance + covariance.T),
         tuple(

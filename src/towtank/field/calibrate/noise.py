@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,21 +22,27 @@ LEAST, MOST = 1e-4, 1e4
 
 @dataclass(frozen=True)
 class Noise:
-    """Densities ``push`` [m2/s3] and ``twist`` [rad2/s3], and the variance ``water`` [m2/s2] of the turbulence."""
+    """Densities ``push`` [m2/s3] and ``twist`` [rad2/s3], and variances of the turbulence, level and down [m2/s2]."""
 
     push: float
     twist: float
-    water: float
+    level: float
+    down: float
 
     @property
     def scales(self) -> Array:
-        """The three, (3,)."""
-        return np.array([self.push, self.twist, self.water])
+        """The four, (4,)."""
+        return np.array([self.push, self.twist, self.level, self.down])
+
+    @property
+    def water(self) -> Array:
+        """Variances (3,) of the turbulence to the north, to the east, down."""
+        return np.array([self.level, self.level, self.down])
 
 
 def noise_of(settings: Settings) -> Noise:
     """The noise that a search starts from."""
-    return Noise(settings.push, settings.twist, settings.turbulence**2)
+    return Noise(settings.push, settings.twist, settings.turbulence**2, settings.turbulence**2)
 
 
 @dataclass(frozen=True)
@@ -59,8 +65,8 @@ class Links:
         return out
 
     def water(self, noise: Noise) -> Array:
-        """Inverse variance (W,) of the change of the water over each window."""
-        return np.asarray(1.0 / (noise.water * (1.0 - self.keep**2)))
+        """Inverse variances (W, 3) of the change of the water over each window."""
+        return np.asarray(1.0 / np.outer(1.0 - self.keep**2, noise.water))
 
 
 def links_of(windows: Windows, settings: Settings) -> Links:
@@ -97,7 +103,7 @@ def _euler(angles: Array) -> Array:
 def learned(now: Noise, first: Noise, squares: Array, free: Array) -> tuple[Noise, float]:
     """The noise of largest evidence, one step on; and the step over what the record tells of the noise.
 
-    squares (3,) : of what each kind of link misses, over its present variance.   free (3,) : how many of its links are
+    squares (4,) : of what each kind of link misses, over its present variance.   free (4,) : how many of its links are
     free of the unknowns: their number less what the unknowns fit of them. A variance of ``free`` numbers is known to a
     share of root 2 / free.
 
@@ -108,5 +114,4 @@ def learned(now: Noise, first: Noise, squares: Array, free: Array) -> tuple[Nois
     factor = np.where(free > 0.0, np.clip((squares / count) ** HURRY, 0.02, 50.0), 1.0)
     scales = np.clip(now.scales * factor, LEAST * first.scales, MOST * first.scales)
     moved = np.abs(np.log(scales / now.scales)) * np.sqrt(0.5 * count)
-    new = replace(now, push=float(scales[0]), twist=float(scales[1]), water=float(scales[2]))
-    return new, float(moved.max())
+    return Noise(*scales.tolist()), float(moved.max())

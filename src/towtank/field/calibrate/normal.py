@@ -11,7 +11,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from towtank.field.calibrate.noise import ANGULAR, LINEAR, MOTION, WATER, Links, Noise
 from towtank.field.calibrate.settings import Settings
 from towtank.field.calibrate.shoot import Piece, Point, wrapped
-from towtank.field.calibrate.windows import SHARED, STATES, Windows
+from towtank.field.calibrate.windows import STATES, Windows
 from towtank.frames import Array
 
 N = len(STATES)
@@ -52,9 +52,7 @@ def missed(windows: Windows, links: Links, point: Point, end: Array) -> Missed:
     return Missed(np.where(on, motion, 0.0), np.where(on, water, 0.0))
 
 
-def expected(
-    windows: Windows, links: Links, gone: Missed, piece: Piece, states: Array, g: Array
-) -> Missed:
+def expected(windows: Windows, links: Links, gone: Missed, piece: Piece, states: Array, g: Array) -> Missed:
     """What is expected to be missed after steps of the windows ``states`` (W, 15) and of ``g`` (G,), to first order."""
     after = np.roll(states, -1, axis=0)
     motion = (piece.end_s @ states[..., None])[..., 0] + piece.end_g @ g - after[:, :MOTION]
@@ -68,23 +66,23 @@ def begins(windows: Windows) -> Array:
     return np.concatenate([[1.0], 1.0 - windows.linked[:-1]])
 
 
-def cost(
-    windows: Windows, links: Links, noise: Noise, prior: Prior, point: Point, end: Array, square: Array
-) -> float:
+def cost(windows: Windows, links: Links, noise: Noise, prior: Prior, point: Point, end: Array, square: Array) -> float:
     """Sum of squares in standard deviations: measurements ``square`` (C,), links, and what was known of the record."""
     gone = missed(windows, links, point, end)
     first = begins(windows)[:, None]
     total = float(square.sum()) + float((((point.shared - prior.centre) / prior.std) ** 2).sum())
     total += float(np.einsum("wi,wij,wj->", gone.motion, links.motion(noise), gone.motion))
-    total += float((links.water(noise)[:, None] * gone.water**2).sum())
-    total += float((first * point.states[:, WATER] ** 2).sum() / noise.water)
+    total += float((links.water(noise) * gone.water**2).sum())
+    total += float((first * point.states[:, WATER] ** 2 / noise.water).sum())
     return total + float((first * ((point.states[:, :MOTION] - windows.guess[:, :MOTION]) / VAGUE) ** 2).sum())
 
 
 @dataclass(frozen=True)
 class Equations:
-    """Normal equations of a record about a point: diagonal (W, 15, 15) and upper (W, 15, 15) blocks of its windows,
-    sg (W, 15, G), gg (G, G), s (W, 15), g (G,).   k : length of z, the first of the G.
+    """Normal equations of a record about a point.
+
+    diagonal, upper (W, 15, 15) : blocks of its windows.   sg (W, 15, G), gg (G, G), s (W, 15), g (G,) : with what is
+    shared, and right sides.   k : length of z, the first of the G.
     """
 
     diagonal: Array
@@ -115,16 +113,16 @@ class Equations:
         """Equations (G, G) and right side (G,) of z and of what lasts the record."""
         y, s = self.solved
         a = self.gg - np.einsum("wig,wih->gh", self.sg, y, optimize=True)
-        return 0.5 * (a + a.T), self.g - np.einsum("wig,wi->g", self.sg, s, optimize=True)
+        return 0.5 * (a + a.T), np.asarray(self.g - np.einsum("wig,wi->g", self.sg, s, optimize=True))
 
-    @property
+    @cached_property
     def told(self) -> tuple[Array, Array]:
         """What the record says of z: information (k, k) and right side (k,)."""
         a, b = self.reduced
         k = self.k
-        gain = np.linalg.solve(a[k:, k:], np.column_stack([a[k:, :k], b[k:]]))
+        gain = np.asarray(np.linalg.solve(a[k:, k:], np.column_stack([a[k:, :k], b[k:]])))
         told = a[:k, :k] - a[:k, k:] @ gain[:, :k]
-        return 0.5 * (told + told.T), b[:k] - a[:k, k:] @ gain[:, k]
+        return np.asarray(0.5 * (told + told.T)), np.asarray(b[:k] - a[:k, k:] @ gain[:, k])
 
     def back(self, step: Array) -> tuple[Array, Array]:
         """Steps of what lasts the record (m,) and of the windows (W, 15), of the step of z (k,)."""
@@ -141,7 +139,7 @@ def equations(
     """The equations of the measurements ``piece``, of the links and of what was known."""
     on = windows.linked
     gone = missed(windows, links, point, piece.end)
-    Qi, water = np.where(on[:, None, None], links.motion(noise), 0.0), np.where(on, links.water(noise), 0.0)
+    Qi, water = np.where(on[:, None, None], links.motion(noise), 0.0), np.where(on[:, None], links.water(noise), 0.0)
     half = np.swapaxes(piece.end_s, 1, 2) @ Qi
     diagonal, sg, s = piece.ss + half @ piece.end_s, piece.sg + half @ piece.end_g, piece.s.copy()
     s -= (half @ gone.motion[..., None])[..., 0]
@@ -154,12 +152,12 @@ def equations(
     sg[1:, :MOTION] -= np.swapaxes(g_half, 1, 2)[:-1]
     s[1:, :MOTION] += pulled[:-1]
     for i in range(MOTION, N):
-        change = gone.water[:, i - MOTION]
-        diagonal[:, i, i] += links.keep**2 * water
-        diagonal[1:, i, i] += water[:-1]
-        upper[:, i, i] -= links.keep * water
-        s[:, i] -= links.keep * water * change
-        s[1:, i] += (water * change)[:-1]
+        change, weight = gone.water[:, i - MOTION], water[:, i - MOTION]
+        diagonal[:, i, i] += links.keep**2 * weight
+        diagonal[1:, i, i] += weight[:-1]
+        upper[:, i, i] -= links.keep * weight
+        s[:, i] -= links.keep * weight * change
+        s[1:, i] += (weight * change)[:-1]
     _begin(windows, noise, point, diagonal, s)
     at = np.arange(k, k + len(prior.std))
     gg[at, at] += 1.0 / prior.std**2
@@ -169,7 +167,7 @@ def equations(
 
 def _begin(windows: Windows, noise: Noise, point: Point, diagonal: Array, s: Array) -> None:
     """Add what is known where a stretch begins."""
-    inverse = np.concatenate([1.0 / VAGUE**2, np.full(N - MOTION, 1.0 / noise.water)])
+    inverse = np.concatenate([1.0 / VAGUE**2, 1.0 / noise.water])
     centre = windows.guess.copy()
     centre[:, WATER] = 0.0
     weight = begins(windows)[:, None] * inverse
@@ -179,8 +177,9 @@ def _begin(windows: Windows, noise: Noise, point: Point, diagonal: Array, s: Arr
 
 @dataclass(frozen=True)
 class Spread:
-    """Covariances after the fit. states (W, 15, 15) : of each window.   link (W, 12, 12), water (W, 3) : of what its
-    link misses.
+    """Covariances after the fit.
+
+    states (W, 15, 15) : of each window.   link (W, 12, 12), water (W, 3) : of what its link misses.
     """
 
     states: Array
@@ -223,12 +222,12 @@ def spread(windows: Windows, links: Links, piece: Piece, it: Equations, shared: 
 def counted(
     windows: Windows, links: Links, noise: Noise, gone: Missed, states: Array, found: Spread
 ) -> tuple[Array, Array]:
-    """Of each kind of link (push, twist, water): squares (3,) of what is missed, and how many are free (3,).
+    """Of each kind of link, as ``Noise.scales``: squares (4,) of what is missed, and how many are free (4,).
 
     states (W, 15) : where ``gone`` is missed.
     """
     on = windows.linked
-    squares, free = np.zeros(3), np.zeros(3)
+    squares, free = np.zeros(4), np.zeros(4)
     for kind, (places, inverse, scale) in enumerate(
         ((LINEAR, links.linear, noise.push), (ANGULAR, links.angular, noise.twist))
     ):
@@ -236,15 +235,11 @@ def counted(
         squares[kind] = np.einsum("wi,wij,wj->", e[on], inverse[on], e[on]) / scale
         part = found.link[on][:, np.array(places)[:, None], places]
         free[kind] = len(places) * on.sum() - np.einsum("wij,wji->", inverse[on], part) / scale
-    first = begins(windows) > 0.0
-    start, at = states[first][:, WATER], np.arange(MOTION, N)
-    inverse = links.water(noise)[:, None]
-    squares[2] = (inverse * gone.water**2)[on].sum() + (start**2).sum() / noise.water
-    free[2] = 3.0 * (on.sum() + first.sum()) - (inverse * found.water)[on].sum()
-    free[2] -= found.states[first][:, at, at].sum() / noise.water
+    first, at = begins(windows) > 0.0, np.arange(MOTION, N)
+    start, inverse = states[first][:, WATER], links.water(noise)
+    missing = (inverse * gone.water**2)[on].sum(axis=0) + (start**2 / noise.water).sum(axis=0)
+    fitted = (inverse * found.water)[on].sum(axis=0)
+    fitted += (found.states[first][:, at, at] / noise.water).sum(axis=0)
+    left = float(on.sum() + first.sum()) - fitted
+    squares[2:], free[2:] = (missing[:2].sum(), missing[2]), (left[:2].sum(), left[2])
     return squares, free
-
-
-def scales_of(windows: Windows) -> tuple[str, ...]:
-    """Names of what lasts the record, for tables."""
-    return (*SHARED[:1], *windows.shared[1:])

@@ -8,7 +8,7 @@ from typing import Any
 
 from towtank.derive.table import Derivatives
 from towtank.experiments.update import SURPRISE
-from towtank.field.calibrate.score import Score, ratio
+from towtank.field.calibrate.score import Score
 
 SQUARES = (0.5, 2.0)
 """Mean square of what is left of a channel, in its stated variance, outside which the stated noise does not fit.
@@ -55,8 +55,10 @@ class Direction:
 
 @dataclass(frozen=True)
 class RecordTable:
-    """What was found of a record. shared : thrust, current, biases -> (value, std).   noise : standard deviation of the
-    turbulence [m/s], spectral densities push and twist.   channels : name -> samples, std, chi2, taken.
+    """What was found of a record.
+
+    shared : thrust, current, biases -> (value, std).   noise : std of the turbulence, level and down [m/s], spectral
+    densities push and twist.   channels : name -> samples, std, chi2 (1 expected), taken (by the unknowns).
     """
 
     name: str
@@ -73,7 +75,7 @@ class RecordTable:
 
 @dataclass(frozen=True)
 class HoldOut:
-    """A record that took no part, foretold by both sets. ratio : geometric mean over its channels, after by before."""
+    """A record that took no part, foretold by both sets."""
 
     before: Score
     after: Score
@@ -81,7 +83,7 @@ class HoldOut:
     @property
     def ratio(self) -> float:
         """What is missed after over what was missed before."""
-        return ratio(self.after, self.before)
+        return self.after.total / self.before.total
 
 
 @dataclass(frozen=True)
@@ -118,9 +120,9 @@ class Calibration:
         out = []
         if self.untold:
             out.append(
-                f"Not told by the records: {', '.join(self.untold)}. Their standard deviation falls by less than a tenth, "
-                "so they rest on the prior, moved only with what they are correlated to. A manoeuvre that excites them is "
-                "needed to know them."
+                f"Not told by the records: {', '.join(self.untold)}. Their standard deviation falls by less than a "
+                "tenth, so they rest on the prior, moved only with what they are correlated to. A manoeuvre that "
+                "excites them is needed to know them."
             )
         weak = [d for d in self.directions if d.left > WEAK]
         if weak:
@@ -135,19 +137,21 @@ WEAK = 0.9
 """Share of a standard deviation above which a combination counts as not told."""
 
 
-def warnings(moves: tuple[Move, ...], records: tuple[RecordTable, ...], fixed: tuple[str, ...], settled: bool) -> list[str]:
+def warnings(
+    moves: tuple[Move, ...], records: tuple[RecordTable, ...], fixed: tuple[str, ...], settled: bool
+) -> list[str]:
     """Sentences on what does not fit."""
     out = []
     if not settled:
         out.append(
-            "The search did not end by itself: its values are not the most likely ones. Let it take more rounds, or leave "
-            "out the record whose channels fit worst."
+            "The search did not end by itself: its values are not the most likely ones. Let it take more rounds, or "
+            "leave out the record whose channels fit worst."
         )
     for move in moves:
         if abs(move.sigmas) > SURPRISE and not move.slope:
             out.append(
-                f"{move.name} moved by {move.sigmas:+.1f} prior standard deviations: the prior was surer than it was right, "
-                "or the record holds something that the model does not. Check the channels of the record first."
+                f"{move.name} moved by {move.sigmas:+.1f} prior standard deviations: the prior was surer than it was "
+                "right, or the record holds something that the model does not. Check the channels of the record first."
             )
     for record in records:
         for name, row in record.channels.items():
@@ -159,7 +163,8 @@ def warnings(moves: tuple[Move, ...], records: tuple[RecordTable, ...], fixed: t
                 )
     if fixed:
         out.append(
-            f"{', '.join(fixed)}: the prior states no uncertainty, so no record can move it. Give it one, or leave it out."
+            f"{', '.join(fixed)}: the prior states no uncertainty, so no record can move it. Give it one, or leave it "
+            "out."
         )
     return out
 

@@ -13,7 +13,7 @@ from towtank.field.calibrate.settings import Settings
 from towtank.field.calibrate.shoot import Engine, Point, wrapped
 from towtank.field.calibrate.smooth import flown, smooth
 from towtank.field.calibrate.windows import SHARED, Windows, windows_of
-from towtank.field.log import MEASURED, SeaLog
+from towtank.field.log import SeaLog
 from towtank.frames import Array
 from towtank.model.equations import Model
 from towtank.progress import Progress
@@ -27,7 +27,8 @@ class Score:
     """Root mean square of what is missed in predictions of ``horizon`` [s], over ``windows`` of them.
 
     rms : channel -> of all samples of all windows, in the channel's unit.   end : of the last fifth of each window.
-    noise : channel -> std of its noise, the least that any model can reach.
+    noise : channel -> std of its noise, the least that any model can reach.   total : root mean square of all samples,
+    each over the std of its channel: 1 where nothing is missed but noise.
     """
 
     log: str
@@ -36,6 +37,7 @@ class Score:
     rms: Mapping[str, float]
     end: Mapping[str, float]
     noise: Mapping[str, float]
+    total: float
 
 
 def score(
@@ -70,14 +72,17 @@ def score(
     states[:, WATER] = lasting * (told.current[it.first] - told.mean_current)
     point = Point(states, told.fit.found[0].point.shared)
     rest = _rest(it, flown(Engine(it, ()), told.fit, point, threads), point)
-    rms, end = {}, {}
+    rms: dict[str, float] = {}
+    end: dict[str, float] = {}
     last = np.arange(rest.shape[1]) >= 0.8 * rest.shape[1]
     for name in it.std:
         column = rest[kept][..., it.channels.index(name)]
         for table, part in ((rms, column), (end, column[:, last])):
             if np.isfinite(part).any():
                 table[name] = float(np.sqrt(np.nanmean(part**2)))
-    return Score(log.name, horizon, int(kept.sum()), rms, end, dict(it.std))
+    whole = np.concatenate([(rest[kept][..., it.channels.index(n)] / std).ravel() for n, std in it.std.items()])
+    total = float(np.sqrt(np.nanmean(whole**2)))
+    return Score(log.name, horizon, int(kept.sum()), rms, end, dict(it.std), total)
 
 
 def _rest(it: Windows, seen: Array, point: Point) -> Array:
@@ -88,9 +93,3 @@ def _rest(it: Windows, seen: Array, point: Point) -> Array:
         place = it.channels.index(name)
         rest[..., place] = wrapped(rest[..., place])
     return rest
-
-
-def ratio(after: Score, before: Score) -> float:
-    """Geometric mean over the channels of what is missed after, over what was missed before."""
-    names = [name for name in MEASURED if name in after.rms and before.rms.get(name, 0.0) > 0.0]
-    return float(np.exp(np.mean([np.log(max(after.rms[n], 1e-300) / before.rms[n]) for n in names])))

@@ -27,7 +27,7 @@ class Settings:
     """How a calibration is done. Each number is assumed unless it is given.
 
     window [s] : of shooting. The turbulent part of the current is constant in a window, so it is short beside
-        ``memory``; and the motion from window to window is then nearly linear in every unknown, so few steps are needed.
+        ``memory``; and the motion in a window is then nearly linear in every unknown, so few steps are needed.
     current [m/s] : standard deviation of the mean current of a record, to the north and to the east; ``upwelling`` that
         downwards.
     turbulence [m/s], memory [s] : standard deviation of the part of the current that changes, each way, and the time in

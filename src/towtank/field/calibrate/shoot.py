@@ -66,8 +66,8 @@ class Engine:
         if compiled is None:
             raise TowtankError(
                 "calibration needs the slopes of the compiled engine, and there is none for this craft here. `towtank "
-                "doctor` tells why; install a C compiler and CasADi, or leave TOWTANK_ENGINE unset. A craft with damaged "
-                "fins that the pilot knows of has no slopes: set faults_known=False."
+                "doctor` tells why; install a C compiler and CasADi, or leave TOWTANK_ENGINE unset. A craft with "
+                "damaged fins that the pilot knows of has no slopes: set faults_known=False."
             )
         self.handle = compiled.handle
         self.base = parameters(self.form, drive.model, NO_PILOT, drive.thrust)
@@ -145,7 +145,7 @@ class Engine:
         a = tangent.reshape(count, n * c, wide)
         at = np.swapaxes(a, 1, 2)
         square, right = at @ a, (at @ rest.reshape(count, n * c, 1))[..., 0]
-        # Sums over the ticks of each channel, for unknowns that simply add to a channel: its bias, and the start of x y z.
+        # Sums over the ticks of each channel, for unknowns that add to a channel: its bias, and the start of x y z.
         plain = np.matmul(np.swapaxes(weight, 1, 2)[:, :, None, :], np.moveaxis(tangent, 2, 1))[:, :, 0]
         plain_square, plain_right = (weight**2).sum(axis=1), (weight * rest).sum(axis=1)
         turn = Turn(self, point, span, columns)
@@ -254,4 +254,3 @@ def quaternion_slopes(angles: Array) -> Array:
 def wrapped(angle: Array) -> Array:
     """``angle`` within half a turn of 0 [rad]."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
-

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -115,10 +116,9 @@ def flown(engine: Engine, found: Fit, point: Point, threads: int | None = None) 
     spans = [slice(a, min(a + CHUNK, total)) for a in range(0, total, CHUNK)]
     crew = Crew(threads)
     try:
-        seen = np.concatenate(
-            crew.each([lambda span=span: engine.fly(common, point, span, slopes=False)[0] for span in spans])
-        )
+        parts = crew.each([partial(engine.fly, common, point, span, slopes=False) for span in spans])
     finally:
         crew.close()
+    seen = np.concatenate([part for part, _ in parts])
     seen[..., 5] = np.unwrap(seen[..., 5], axis=1)
     return seen

@@ -1,4 +1,4 @@
-"""The coefficients that a record may move: independent values, their prior, and the engine's parameters they stand in."""
+"""The coefficients that a record may move: independent values, their prior, the engine's parameters they stand in."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Unknowns:
     @property
     def size(self) -> int:
         """Length of z."""
-        return self.root.shape[1]
+        return int(self.root.shape[1])
 
     @property
     def columns(self) -> Array:
@@ -59,7 +59,7 @@ class Unknowns:
 
 
 def unknowns(prior: Derivatives, terms: Sequence[str] | None = None) -> Unknowns:
-    """The unknowns of ``prior``: the ``terms`` named and their twins by symmetry, or all that its covariance leaves open.
+    """The unknowns of ``prior``: ``terms`` and their twins by symmetry, or all that its covariance leaves open.
 
     The terms that are not chosen stay, and count as known.
 

@@ -34,8 +34,8 @@ class Windows:
     """W windows of at most n ticks of a record.
 
     first, ticks (W,) : place and length of each.   linked (W,) : the next window goes on where it ends.
-    channels (C,) : those seen: STATE, then other measured ones.   measured (W, n, C) : at the ends of the ticks, 0 where
-        nothing was.   weight (W, n, C) : 1 / std, 0 where nothing was.   std : of each measured channel.
+    channels (C,) : those seen: STATE, then other measured ones.   measured (W, n, C) : at the ends of the ticks, 0
+        where nothing was.   weight (W, n, C) : 1 / std, 0 where nothing was.   std : of each measured channel.
     assumed : channels whose std nobody stated.   biased : channels with a bias, as places.   bias : its prior std.
     guess (W, 15) : where the search starts.   delta (W, fins) : fin angles at the start of each window [rad].
     left_out : samples left out because they are flagged.
@@ -131,7 +131,7 @@ def _smooth(model: Model) -> Model:
 
 
 def _cut(whole: NDArray[np.bool_], size: int) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
-    """First tick, length, and whether the next goes on, of windows of ``size`` ticks in the ``whole`` (N,) stretches."""
+    """First tick, length, and whether the next goes on, of windows of ``size`` ticks in ``whole`` (N,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
     first: list[int] = []
     ticks: list[int] = []
@@ -162,7 +162,7 @@ def _without_flagged(log: SeaLog, drive: Drive) -> tuple[dict[str, Array], int]:
 
 
 def _guess(log: SeaLog, drive: Drive, seen: dict[str, Array]) -> Array:
-    """Where the search starts (N + 1, 15): what was measured, by straight lines, and straight ahead where nothing was."""
+    """Where the search starts (N + 1, 15): what was measured, by straight lines, else straight ahead."""
     time = drive.time
     out = np.zeros((len(time), len(STATES)))
 
