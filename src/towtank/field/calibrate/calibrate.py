@@ -107,7 +107,7 @@ def _refuse(model: Model, logs: Sequence[SeaLog]) -> None:
         if log.craft and log.craft != model.craft.name:
             raise InputError(
                 f"log {log.name} is of {log.craft!r}, the model of {model.craft.name!r}. One craft's record "
-                "says nothing of another's derivatives. If it is the same craft, name it so in the mapping of the record."
+                "says nothing of another's derivatives. If it is the same craft, name it so in the mapping."
             )
         known = log_hash(log)
         if known in used:

@@ -128,9 +128,9 @@ class Equations:
         """Steps of what lasts the record (m,) and of the windows (W, 15), of the step of z (k,)."""
         a, b = self.reduced
         k = self.k
-        shared = np.linalg.solve(a[k:, k:], b[k:] - a[k:, :k] @ step)
+        shared = np.asarray(np.linalg.solve(a[k:, k:], b[k:] - a[k:, :k] @ step))
         y, s = self.solved
-        return shared, s - y @ np.concatenate([step, shared])
+        return shared, np.asarray(s - y @ np.concatenate([step, shared]))
 
 
 def equations(
