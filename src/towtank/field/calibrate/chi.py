@@ -20,7 +20,7 @@ def leverage(fit: Fit, number: int, crew: Crew) -> Array:
     """
     case, found, C = fit.cases[number], fit.found[number], fit.shared[number]
     P = spread(case.windows, case.links, found.piece, found.equations, C).states
-    Y = found.equations.solved[0]
+    Y = found.equations.gains
     values, columns = fit.unknowns.values(fit.z), fit.unknowns.columns
     common = case.engine.common(values)
 

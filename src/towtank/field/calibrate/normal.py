@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg.lapack import dtbtrs
 
 from towtank.field.calibrate.noise import ANGULAR, LINEAR, MOTION, WATER, Links, Noise
 from towtank.field.calibrate.settings import Settings
@@ -94,24 +95,41 @@ class Equations:
     k: int
 
     @cached_property
-    def solved(self) -> tuple[Array, Array]:
-        """Inverse of the windows' equations times sg (W, 15, G), and times s (W, 15)."""
-        w, _, size = self.sg.shape
-        band = np.zeros((2 * N, N * w))
+    def factor(self) -> Array:
+        """Lower factor of the windows' equations, by bands (30, 15 W)."""
+        band = np.zeros((2 * N, N * len(self.s)))
         for r in range(N):
             for c in range(N):
                 if r >= c:
                     band[r - c, c::N] = self.diagonal[:, r, c]
                 band[N + r - c, c:-N:N] = self.upper[:-1, c, r]
-        factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-        right = np.concatenate([self.sg, self.s[..., None]], axis=2).reshape(N * w, size + 1)
-        out = cho_solve_banded((factor, True), right, check_finite=False).reshape(w, N, size + 1)
-        return out[..., :size], out[..., size]
+        return np.asarray(cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False))
+
+    @cached_property
+    def gains(self) -> Array:
+        """Inverse of the windows' equations times sg (W, 15, G)."""
+        w, _, size = self.sg.shape
+        out = cho_solve_banded((self.factor, True), self.sg.reshape(N * w, size), check_finite=False)
+        return np.asarray(out.reshape(w, N, size))
+
+    @cached_property
+    def alone(self) -> Array:
+        """Step (W, 15) of the windows if nothing else moved."""
+        return np.asarray(cho_solve_banded((self.factor, True), self.s.ravel(), check_finite=False).reshape(-1, N))
+
+    def drawn(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """A draw of the windows (W, 15) and of what lasts the record (m,) about the most likely ones, at a fixed z."""
+        k, (a, _) = self.k, self.reduced
+        free, info = dtbtrs(self.factor, rng.standard_normal((self.s.size, 1)), uplo="L", trans="T")
+        if info:
+            raise np.linalg.LinAlgError("the factor of a record is singular")
+        shared = np.linalg.solve(np.linalg.cholesky(a[k:, k:]).T, rng.standard_normal(len(a) - k))
+        return free.reshape(-1, N) - self.gains[..., k:] @ shared, np.asarray(shared)
 
     @cached_property
     def reduced(self) -> tuple[Array, Array]:
         """Equations (G, G) and right side (G,) of z and of what lasts the record."""
-        y, s = self.solved
+        y, s = self.gains, self.alone
         a = self.gg - np.einsum("wig,wih->gh", self.sg, y, optimize=True)
         return 0.5 * (a + a.T), np.asarray(self.g - np.einsum("wig,wi->g", self.sg, s, optimize=True))
 
@@ -129,7 +147,7 @@ class Equations:
         a, b = self.reduced
         k = self.k
         shared = np.asarray(np.linalg.solve(a[k:, k:], b[k:] - a[k:, :k] @ step))
-        y, s = self.solved
+        y, s = self.gains, self.alone
         return shared, np.asarray(s - y @ np.concatenate([step, shared]))
 
 
@@ -138,41 +156,48 @@ def equations(
 ) -> Equations:
     """The equations of the measurements ``piece``, of the links and of what was known."""
     on = windows.linked
-    gone = missed(windows, links, point, piece.end)
     Qi, water = np.where(on[:, None, None], links.motion(noise), 0.0), np.where(on[:, None], links.water(noise), 0.0)
     half = np.swapaxes(piece.end_s, 1, 2) @ Qi
-    diagonal, sg, s = piece.ss + half @ piece.end_s, piece.sg + half @ piece.end_g, piece.s.copy()
-    s -= (half @ gone.motion[..., None])[..., 0]
+    diagonal, sg = piece.ss + half @ piece.end_s, piece.sg + half @ piece.end_g
     upper = np.zeros_like(diagonal)
     upper[:, :, :MOTION] = -half
     g_half = np.swapaxes(piece.end_g, 1, 2) @ Qi
-    gg, g = piece.gg + (g_half @ piece.end_g).sum(axis=0), piece.g - (g_half @ gone.motion[..., None]).sum(axis=0)[:, 0]
-    pulled = (Qi @ gone.motion[..., None])[..., 0]
+    gg = piece.gg + (g_half @ piece.end_g).sum(axis=0)
     diagonal[1:, :MOTION, :MOTION] += Qi[:-1]
     sg[1:, :MOTION] -= np.swapaxes(g_half, 1, 2)[:-1]
-    s[1:, :MOTION] += pulled[:-1]
     for i in range(MOTION, N):
-        change, weight = gone.water[:, i - MOTION], water[:, i - MOTION]
+        weight = water[:, i - MOTION]
         diagonal[:, i, i] += links.keep**2 * weight
         diagonal[1:, i, i] += weight[:-1]
         upper[:, i, i] -= links.keep * weight
-        s[:, i] -= links.keep * weight * change
-        s[1:, i] += (weight * change)[:-1]
-    _begin(windows, noise, point, diagonal, s)
+    diagonal[:, range(N), range(N)] += _beginning(windows, noise)
     at = np.arange(k, k + len(prior.std))
     gg[at, at] += 1.0 / prior.std**2
-    g[at] -= (point.shared - prior.centre) / prior.std**2
-    return Equations(diagonal, upper, sg, gg, s, g, k)
+    return Equations(diagonal, upper, sg, gg, *right_sides(windows, links, noise, prior, point, piece, k), k)
 
 
-def _begin(windows: Windows, noise: Noise, point: Point, diagonal: Array, s: Array) -> None:
-    """Add what is known where a stretch begins."""
-    inverse = np.concatenate([1.0 / VAGUE**2, 1.0 / noise.water])
+def right_sides(
+    windows: Windows, links: Links, noise: Noise, prior: Prior, point: Point, piece: Piece, k: int
+) -> tuple[Array, Array]:
+    """Right sides (W, 15) of the windows and (G,) of what they share: half of the slopes of the cost, downhill."""
+    gone = missed(windows, links, point, piece.end)
+    pulled = (links.motion(noise) @ gone.motion[..., None])[..., 0]
+    s = piece.s - (np.swapaxes(piece.end_s, 1, 2) @ pulled[..., None])[..., 0]
+    g = piece.g - (np.swapaxes(piece.end_g, 1, 2) @ pulled[..., None]).sum(axis=0)[:, 0]
+    s[1:, :MOTION] += pulled[:-1]
+    change = links.water(noise) * gone.water
+    s[:, WATER] -= links.keep[:, None] * change
+    s[1:, WATER] += change[:-1]
     centre = windows.guess.copy()
     centre[:, WATER] = 0.0
-    weight = begins(windows)[:, None] * inverse
-    diagonal[:, range(N), range(N)] += weight
-    s -= weight * (point.states - centre)
+    s -= _beginning(windows, noise) * (point.states - centre)
+    g[k:] -= (point.shared - prior.centre) / prior.std**2
+    return s, g
+
+
+def _beginning(windows: Windows, noise: Noise) -> Array:
+    """Inverse variances (W, 15) of what is known of a window because a stretch begins there."""
+    return np.asarray(begins(windows)[:, None] * np.concatenate([1.0 / VAGUE**2, 1.0 / noise.water]))
 
 
 @dataclass(frozen=True)
@@ -205,7 +230,7 @@ def spread(windows: Windows, links: Links, piece: Piece, it: Equations, shared: 
         if windows.linked[i]:
             pair[i] = -gain[i] @ states[i + 1]
             states[i] = states[i] - pair[i] @ gain[i].T
-    y = it.solved[0]
+    y = it.gains
     after, y_after = np.roll(states, -1, axis=0), np.roll(y, -1, axis=0)
     F = piece.end_s
     own = F @ states @ np.swapaxes(F, 1, 2) + after[:, :MOTION, :MOTION]

@@ -36,6 +36,8 @@ class Settings:
         only the ratio of thrust to resistance.
     push [m2/s3], twist [rad2/s3] : spectral densities of the accelerations that no term holds.
     learn : the last three are taken from the records themselves (largest evidence), starting from these values.
+    mean : the coefficients are those of largest density with the motions left open, not together with the most likely
+        motions; the second is biased where the water or other accelerations are seen in the motion.
     rounds : most steps of the search.   tolerance : it ends when a step is expected to gain less of the cost, which
         is a sum of squares in standard deviations.
     told : a coefficient is told by the record when its standard deviation falls below this share of the prior's.
@@ -50,6 +52,7 @@ class Settings:
     push: float = 1e-5
     twist: float = 1e-7
     learn: bool = True
+    mean: bool = True
     rounds: int = 20
     tolerance: float = 1e-2
     told: float = 0.9
