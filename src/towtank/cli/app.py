@@ -16,12 +16,14 @@ from towtank.cli.doctor import doctor
 from towtank.cli.faults import faults
 from towtank.cli.grid import grid
 from towtank.cli.imports import import_
+from towtank.cli.log import log
 from towtank.cli.mc import mc
 from towtank.cli.new import new
 from towtank.cli.pilot import pilot
 from towtank.cli.plan import plan
 from towtank.cli.report import report
 from towtank.cli.run import run
+from towtank.cli.sea import sea
 from towtank.cli.solve_case import solve_case
 from towtank.cli.status import status
 from towtank.cli.sweep import sweep
@@ -73,11 +75,13 @@ for _command in (
     tune,
     mc,
     faults,
+    sea,
     assess,
     sweep,
     design,
     calibrate,
     report,
+    log,
     doctor,
 ):
     app.command(_command.__name__.strip("_").replace("_", "-"))(_command)

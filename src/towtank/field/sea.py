@@ -1,9 +1,10 @@
 """Craft that swim through a varying current: the truth behind a synthetic record.
 
-The engine holds one current in a run, so a trial is flown in pieces of ``Environment.piece`` seconds, each with the
-current at the craft's depth and time when it begins. State and memory of the steering go from piece to piece, and so do
-a leg's remaining time and the side from which it waits for its event. The state holds velocities over ground: when the
-current changes by dc, the velocity through the water changes by -dc at once, as for a body of inertia that an eddy hits.
+The engine holds one current in a run. In a steady, uniform current a trial is one run of it, up to an hour. In any
+other it is flown in pieces of ``Environment.piece`` seconds, each with the current at the craft's depth and time when
+it begins. State and memory of the steering go from piece to piece, and so does what is left of a leg. The state holds
+velocities over ground: when the current changes by dc, the velocity through the water changes by -dc at once, as if the
+craft swam into an eddy with a sharp edge.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ from towtank.trials.ready import Ready
 from towtank.trials.start import setting
 
 STILL_SEA = Environment()
+LONGEST_PIECE = 3600.0
+"""Longest piece [s] in a steady, uniform current."""
 SAME = 1e-9
 """Times [s] closer than this are one; the loop of the engine takes the same."""
 _POSE = ("x", "y", "z", "phi", "theta", "psi", "u", "v", "w", "p", "q", "r")
@@ -92,13 +95,14 @@ def swim(
     out.
 
     Each craft begins at the trial's speed through the water, has eddies of its own, and the same orders. With one craft
-    legs may end by events.
+    legs may end by events. Where fins have a dead band or play, each piece takes their angle for the last command they
+    answered, so a command within the band may be answered anew.
 
     Raises
     ------
     InputError
-        Several craft under legs that end by events; a pilot whose sensors are not exact; a current that is not below
-        the trial's speed; whatever ``fly`` refuses.
+        Several craft under legs that end by events; a pilot whose sensors are not exact, in a current that is not
+        steady and uniform; a current that is not below the trial's speed; whatever ``fly`` refuses.
     """
     clock = clock or clock_of(model, trial.setting.speed)
     _check(trial, environment, count)
@@ -116,18 +120,19 @@ def _check(trial: Ready, environment: Environment, count: int) -> None:
     waiting = [leg.name for leg in trial.legs if leg.until is not None]
     if count > 1 and waiting:
         raise InputError(
-            f"sea: leg {waiting[0]!r} of {trial.name} ends by an event, which comes to each of {count} craft at another "
-            "time. Let one craft swim at a time, or give legs that end by time."
+            f"leg {waiting[0]!r} of {trial.name} ends by an event, which comes to each of {count} craft at a time "
+            "of its own. Let one craft swim at a time, or give legs that end by time."
         )
-    if trial.setting.pilot is not None and not trial.setting.pilot.sensors.exact:
+    pieces = not environment.steady or sum(leg.within for leg in trial.legs) > LONGEST_PIECE
+    if pieces and trial.setting.pilot is not None and not trial.setting.pilot.sensors.exact:
         raise InputError(
-            "sea: the pilot's sensors have noise, which the engine draws anew in each piece of constant current; an "
+            "the pilot's sensors have noise, which the engine draws anew in each piece of constant current; an "
             "offset would not last. Give a pilot with exact sensors; the record gets its noise from the instruments."
         )
     water = np.linalg.norm(np.asarray(environment.current) + np.asarray(trial.current))
     if water >= trial.setting.speed:
         raise InputError(
-            f"sea: a mean current of {water:.3g} m/s is not below the craft's {trial.setting.speed:.3g} m/s; it cannot "
+            f"a mean current of {water:.3g} m/s is not below the craft's {trial.setting.speed:.3g} m/s; it cannot "
             "make way against it. Give a slower current or a faster trial."
         )
 
@@ -146,9 +151,11 @@ class _Voyage:
 
     def __post_init__(self) -> None:
         trial, env, tick = self.trial, self.environment, self.clock.tick
-        self.ticks = max(1, round(env.piece / tick))
+        longest = sum(leg.within for leg in trial.legs)
+        piece = min(longest + tick, LONGEST_PIECE) if env.steady else env.piece
+        self.ticks = max(1, round(piece / tick))
         self.step = self.ticks * tick
-        self.pieces = int(np.ceil(sum(leg.within for leg in trial.legs) / self.step - SAME))
+        self.pieces = max(1, int(np.ceil(longest / self.step - SAME)))
         self.gusts = eddies(env, self.step, self.count, self.pieces) if any(env.turbulence) else None
         state = np.array(trial.setting.state if trial.start is None else trial.start, dtype=float)
         state[6:9] += rotation(state[3:6]).T @ mean_current(env, state[2])
@@ -178,15 +185,15 @@ class _Voyage:
         if self.gusts is not None:
             current = current + self.gusts[:, self.begun]
         taken: dict[int, float] = {}
-        turns = 0.0
+        turns, plan = 0.0, self._plan({}, 0.0)
         while True:
-            plan = self._plan(taken, turns)
             flights = self._fly([leg for _, leg in plan], current)
             slip = round((float(flights.log[0, 0, self.names.index("psi")]) - self._heading(turns)) / (2.0 * np.pi))
-            found = self._events(plan, flights)
-            if slip == 0 and found.keys() <= taken.keys():
+            turns, taken = turns + slip, ({} if slip else {**taken, **self._events(plan, flights)})
+            again = self._plan(taken, turns)
+            if again == plan:
                 break
-            turns, taken = turns + slip, ({} if slip else {**taken, **found})
+            plan = again
         self._keep(plan, flights, current)
 
     def _heading(self, turns: float) -> float:
@@ -228,7 +235,7 @@ class _Voyage:
         return fly(
             self.model, self.state[0], legs, thrust=self.trial.setting.thrust, pilot=self.trial.setting.pilot,
             clock=self.clock, log=Log(self.names), threads=self.threads,
-            ensemble=Ensemble(self.count, {**self.parameters, **flow}, start=self.state),
+            ensemble=Ensemble(self.count, {**self.parameters, **flow}, start=self.state), seed=self.environment.seed,
         )  # fmt: skip
 
     def _events(self, plan: Sequence[tuple[int, Leg]], flights: Flights) -> dict[int, float]:

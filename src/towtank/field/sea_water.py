@@ -48,14 +48,14 @@ class Environment:
         for name, size in sizes.items():
             values = np.asarray(getattr(self, name), dtype=float)
             if values.shape != (size,) or not np.isfinite(values).all():
-                raise InputError(f"sea: {name} {getattr(self, name)!r}. Give {size} finite numbers.")
+                raise InputError(f"water: {name} {getattr(self, name)!r}. Give {size} finite numbers.")
         if min(self.turbulence) < 0.0:
-            raise InputError(f"sea: turbulence {self.turbulence}. A standard deviation is 0 or more.")
+            raise InputError(f"water: turbulence {self.turbulence}. A standard deviation is 0 or more.")
         for name in ("correlation", "piece"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise InputError(f"sea: {name} {getattr(self, name)} s. Give a finite time above zero.")
+                raise InputError(f"water: {name} {getattr(self, name)} s. Give a finite time above zero.")
         if not np.isfinite(self.depth):
-            raise InputError(f"sea: depth {self.depth} m of the current. Give a finite depth.")
+            raise InputError(f"water: depth {self.depth} m of the current. Give a finite depth.")
         check_seed(self.seed)
 
     @property
@@ -73,7 +73,7 @@ def check_seed(seed: int) -> int:
         It is not.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < GROUND:
-        raise InputError(f"sea: seed {seed!r}. Give a whole number from 0 to {GROUND - 1}.")
+        raise InputError(f"seed {seed!r} is no seed. Give a whole number from 0 to {GROUND - 1}.")
     return int(seed)
 
 
@@ -89,14 +89,14 @@ def passing_time(length: float, speed: float) -> float:
         A length or speed that is not positive.
     """
     if not (length > 0.0 and speed > 0.0):
-        raise InputError(f"sea: eddies of {length:g} m at {speed:g} m/s. Give a length and a speed above zero.")
+        raise InputError(f"water: eddies of {length:g} m at {speed:g} m/s. Give a length and a speed above zero.")
     return length / speed
 
 
 def eddies(environment: Environment, step: float, count: int, pieces: int) -> Array:
     """Velocities (count, pieces, 3) [m/s, NED] of the eddies that ``count`` craft feel, ``step`` [s] apart.
 
-    Source     fossen2021, ch. 10: first-order Gauss-Markov process; gillespie1996, eq. 1.9a, for steps of any length:
+    Source     fossen2021, ch. 10: first-order Gauss-Markov process; gillespie1996 for steps of any length:
                c(t + dt) = f c(t) + std sqrt(1 - f^2) n, f = exp(-dt / T). It starts in its steady state.
     Departure  The sources let speed or one variable wander; here each of the three parts does, on its own.
     """
