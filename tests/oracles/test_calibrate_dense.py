@@ -20,7 +20,7 @@ from towtank.field.sea_water import Environment
 
 def searched():
     model, settings = hokie(), Settings(learn=False)
-    logs = records(model, 20.0, Environment(turbulence=(0.02, 0.02, 0.01)), count=2)
+    logs = records(model, 12.0, Environment(turbulence=(0.02, 0.02, 0.01)), count=2)
     free = unknowns(model.derivatives)
     cases = [case_of(windows_of(model, log, settings), free.names, settings) for log in logs]
     return Search(cases, free, settings, Crew(1)), free

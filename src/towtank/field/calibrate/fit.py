@@ -41,8 +41,11 @@ LOOKS = 4
 MEANS, DRAW_SEED = 6, 20
 """Most steps with drawn motions, and the seed of these. The means run over all windows of a record, so one pair of
 draws is many."""
-CLOSE = 0.05
-"""Last step of the coefficients, in standard deviations of all together."""
+CLOSE, FAR = 0.1, 0.05
+"""Step that is still to come, in standard deviations of all coefficients together, at which the last one ends; and the
+share of a step by which its own linear forecast may be off."""
+TERMS = 4
+"""Steps forecast at a time."""
 SUMMED = ("gg", "g", "square")
 """Fields of ``Piece`` that are sums over the windows."""
 
@@ -232,15 +235,15 @@ class Search:
             drawn = [it.drawn(rng) for it in all_of]
             sides = [self._drawn(drawn, side) for side in (-1.0, 1.0)]
             mean = self.crew.each([partial(averaged, pair) for pair in zip(*sides, strict=True)])
-            dz, backs, _ = self.step(mean)
+            dz, rest = _onwards(self.step(mean)[0], info, np.eye(len(info)) + sum(it.told[0] for it in mean))
             self.z = self.z + dz
             self.points = [
                 Point(point.states + states, point.shared + shared)
-                for point, (shared, states) in zip(self.points, backs, strict=True)
+                for point, (shared, states) in zip(self.points, [it.back(dz) for it in mean], strict=True)
             ]
             self.pieces = gathered(self.crew, self.cases, self.unknowns, self.z, self.points)
             all_of = self.equations()
-            if float(dz @ info @ dz) < CLOSE**2:
+            if max(rest, FAR * float(np.sqrt(dz @ info @ dz))) < CLOSE:
                 break
         return list(all_of)
 
@@ -255,6 +258,21 @@ class Search:
             equations(c.windows, c.links, noise, c.prior, point, piece, self.unknowns.size)
             for c, noise, point, piece in zip(self.cases, self.noise, points, pieces, strict=True)
         ]
+
+
+def _onwards(dz: Array, told: Array, whole: Array) -> tuple[Array, float]:
+    """The steps that would follow ``dz`` (k,) too, and the size of the first that is left out.
+
+    told, whole (k, k) : information on z with the motions left open, and with them fixed. A step goes told / whole of
+    the way, so that steps form a geometric series.
+
+    Source     louis1982, sec. 5, summed to ``TERMS`` terms in place of the inverse, so that it never goes too far.
+    """
+    out, term = np.zeros_like(dz), dz
+    for _ in range(TERMS):
+        out = out + term
+        term = term - np.linalg.solve(whole, told @ term)
+    return out, float(np.sqrt(max(term @ told @ term, 0.0)))
 
 
 def averaged(both: Sequence[Equations]) -> Equations:
@@ -303,8 +321,8 @@ def _searched(search: Search, settings: Settings, progress: Progress) -> Fit:
     for number in range(settings.rounds + 1):
         all_of = search.equations()
         dz, backs, gain = search.step(all_of)
-        # The noise is looked for once the motion lies near the record: before, what is missed is the search's own.
-        for _ in range(LOOKS if learning and number > 1 else 0):
+        # Not before the first step: until then, what is missed is the guess's own.
+        for _ in range(LOOKS if learning and number > 0 else 0):
             if learning:
                 learning = not search.learn(all_of)
                 all_of = search.equations()

@@ -16,7 +16,9 @@ LINEAR, ANGULAR = [0, 1, 2, 6, 7, 8], [3, 4, 5, 9, 10, 11]
 WATER = slice(MOTION, len(STATES))
 HURRY = 1.5
 """Power of the factor of a step: the repeated rule comes near its end by constant shares."""
-LEAST, MOST = 1e-4, 1e4
+KNOWN = 5.0
+"""Most standard deviations that a factor e of a variance counts: a share of 4 % of it changes no interval."""
+LEAST, MOST = 1e-3, 1e4
 """Factors by which a density may leave its starting value in all."""
 
 
@@ -113,5 +115,5 @@ def learned(now: Noise, first: Noise, squares: Array, free: Array) -> tuple[Nois
     count = np.maximum(free, 1e-9)
     factor = np.where(free > 0.0, np.clip((squares / count) ** HURRY, 0.02, 50.0), 1.0)
     scales = np.clip(now.scales * factor, LEAST * first.scales, MOST * first.scales)
-    moved = np.abs(np.log(scales / now.scales)) * np.sqrt(0.5 * count)
+    moved = np.abs(np.log(scales / now.scales)) * np.minimum(np.sqrt(0.5 * count), KNOWN)
     return Noise(*scales.tolist()), float(moved.max())

@@ -16,9 +16,19 @@ from towtank.field.calibrate.windows import STATES, Windows
 from towtank.frames import Array
 
 N = len(STATES)
-VAGUE = np.array([1e3, 1e3, 1e3, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 1.0, 1.0, 1.0])
+VAGUE = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 1.0, 1.0, 1.0])
 """Standard deviations of the motion about the guess where a stretch of the record begins [m, rad, m/s, rad/s]: so wide
-that a measurement of any use replaces them."""
+that a measurement of any use replaces them. A position that nobody measures is one of the datum, known to a metre."""
+WIDE = 30.0
+"""The same for a measured position, in standard deviations of its sensor."""
+
+
+def vague(windows: Windows) -> Array:
+    """Standard deviations (12,) of the motion where a stretch begins, about the guess."""
+    out = VAGUE.copy()
+    for i, name in enumerate("xyz"):
+        out[i] = max(out[i], WIDE * windows.std.get(name, 0.0))
+    return out
 
 
 @dataclass(frozen=True)
@@ -75,7 +85,7 @@ def cost(windows: Windows, links: Links, noise: Noise, prior: Prior, point: Poin
     total += float(np.einsum("wi,wij,wj->", gone.motion, links.motion(noise), gone.motion))
     total += float((links.water(noise) * gone.water**2).sum())
     total += float((first * point.states[:, WATER] ** 2 / noise.water).sum())
-    return total + float((first * ((point.states[:, :MOTION] - windows.guess[:, :MOTION]) / VAGUE) ** 2).sum())
+    return total + float((first * ((point.states[:, :MOTION] - windows.guess[:, :MOTION]) / vague(windows)) ** 2).sum())
 
 
 @dataclass(frozen=True)
@@ -197,7 +207,7 @@ def right_sides(
 
 def _beginning(windows: Windows, noise: Noise) -> Array:
     """Inverse variances (W, 15) of what is known of a window because a stretch begins there."""
-    return np.asarray(begins(windows)[:, None] * np.concatenate([1.0 / VAGUE**2, 1.0 / noise.water]))
+    return np.asarray(begins(windows)[:, None] * np.concatenate([1.0 / vague(windows) ** 2, 1.0 / noise.water]))
 
 
 @dataclass(frozen=True)

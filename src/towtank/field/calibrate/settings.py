@@ -54,7 +54,7 @@ class Settings:
     learn: bool = True
     mean: bool = True
     rounds: int = 20
-    tolerance: float = 1e-2
+    tolerance: float = 0.1
     told: float = 0.9
 
     def __post_init__(self) -> None:

@@ -154,7 +154,7 @@ def _without_flagged(log: SeaLog, drive: Drive) -> tuple[dict[str, Array], int]:
     seen, count = {name: values.copy() for name, values in drive.seen.items()}, 0
     for flag in log.flags:
         if flag.kind in LEFT_OUT and flag.channel in seen:
-            half = 0.5 * drive.clock.tick
+            half = 0.5 * drive.clock.tick * (1.0 - 1e-6)
             hit = (drive.time >= flag.start - half) & (drive.time <= flag.end + half)
             count += int(np.isfinite(seen[flag.channel][hit]).sum())
             seen[flag.channel][hit] = np.nan
