@@ -153,15 +153,18 @@ def rows(found: list[Outcome]) -> Iterator[list[str]]:
 
 
 def main(seas: int) -> None:
-    """Swim the seas and write the table."""
-    workers = min(len(os.sched_getaffinity(0)), -(-seas // GROUP))
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        found = [one for group in pool.map(group_of, range(-(-seas // GROUP))) for one in group][:seas]
-    settled = sum(one.settled for one in found)
-    made_by = f"{CRAFT}, synthetic, {seas} seas of {SECONDS:g} s at {1.0 / TICK:g} Hz, {settled} searches settled"
-    write_table(
-        TARGET, made_by, ("coefficient", "seas", "coverage_95", "mean_pull", "std_of_pulls", "left"), rows(found)
-    )
+    """Swim the seas; the table is written anew after each group."""
+    groups = -(-seas // GROUP)
+    head = ("coefficient", "seas", "coverage_95", "mean_pull", "std_of_pulls", "left")
+    found: list[Outcome] = []
+    with ProcessPoolExecutor(
+        min(len(os.sched_getaffinity(0)), groups), mp_context=multiprocessing.get_context("spawn")
+    ) as pool:
+        for group in pool.map(group_of, range(groups)):
+            found = [*found, *group][:seas]
+            settled = sum(one.settled for one in found)
+            made_by = f"{CRAFT}, synthetic, {len(found)} seas of {SECONDS:g} s at {1.0 / TICK:g} Hz, {settled} settled"
+            write_table(TARGET, made_by, head, rows(found))
 
 
 if __name__ == "__main__":

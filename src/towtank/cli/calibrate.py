@@ -17,6 +17,7 @@ from towtank.parallel import cores
 
 if TYPE_CHECKING:
     from towtank.field.calibrate.result import Calibration, HoldOut
+    from towtank.field.calibrate.settings import Settings
     from towtank.field.log import SeaLog
     from towtank.model.equations import Model
 
@@ -52,6 +53,18 @@ Turbulence = Annotated[
         help="Standard deviation of the changing current; without it, it is taken from the records.",
     ),
 ]  # fmt: skip
+Map = Annotated[
+    str | None,
+    typer.Option(
+        "--map",
+        metavar="MAPPING",
+        show_default=False,
+        help="Mapping of records that are not towtank's own.",
+    ),
+]
+Ballasted = Annotated[
+    bool, typer.Option("--ballasted", help="The craft was ballasted to neutral: its weight is its buoyancy.")
+]
 Doubt = Annotated[
     float,
     typer.Option(
@@ -69,6 +82,8 @@ def calibrate(
     window: Window = None,
     turbulence: Turbulence = None,
     doubt: Doubt = 0.0,
+    ballasted: Ballasted = False,
+    map: Map = None,
     out: Out = None,
     json: Json = False,
     debug: Debug = False,
@@ -86,14 +101,31 @@ def calibrate(
         chain = open_chain(reply, study, out).keep_speed()
         reply.kept = "Nothing is written before the end; the study is as it was."
         reply.summary |= {"craft": chain.craft.name}
-        model = _doubted(chain.model(), _words(terms), doubt)
-        found = _calibrated(reply, model, chain, logs, hold_out or [], _words(terms), horizon, window, turbulence)
+        model = _doubted(_afloat(chain.model(), ballasted), _words(terms), doubt)
+        records = [_read(name, map, chain) for name in logs]
+        held = [_read(name, map, chain) for name in hold_out or []]
+        for log in (*records, *held):
+            _remark(reply, log, ballasted)
+        settings = _settings(window, turbulence)
+        from towtank.field.calibrate.calibrate import calibrate
+        from towtank.quantity import si
+
+        found = calibrate(
+            model, records, terms=_words(terms), hold_out=held, settings=settings,
+            horizon=si(horizon, "s", "--horizon"), progress=reply.progress, threads=cores(),
+        )  # fmt: skip
         _publish(chain, found)
         _tell(reply, found)
 
 
 def _words(text: str | None) -> tuple[str, ...] | None:
     return None if text is None else tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def _afloat(model: Model, neutral: bool) -> Model:
+    from towtank.trials.start import ballasted
+
+    return ballasted(model) if neutral else model
 
 
 def _doubted(model: Model, terms: tuple[str, ...] | None, doubt: float) -> Model:
@@ -106,44 +138,37 @@ def _doubted(model: Model, terms: tuple[str, ...] | None, doubt: float) -> Model
     return model.with_derivatives(with_errors(model.derivatives, dict.fromkeys(names, doubt)))
 
 
-def _calibrated(
-    reply: Reply, model: Model, chain: Chain, logs: list[str], held: list[str], terms: tuple[str, ...] | None,
-    horizon: str, window: str | None, turbulence: str | None,
-) -> Calibration:  # fmt: skip
-    from towtank.field.calibrate.calibrate import calibrate
+def _settings(window: str | None, turbulence: str | None) -> Settings:
+    """What is assumed, with what the user says."""
     from towtank.field.calibrate.settings import Settings
     from towtank.quantity import si
 
-    settings = Settings()
+    out = Settings()
     if window is not None:
-        settings = replace(settings, window=si(window, "s", "--window"))
+        out = replace(out, window=si(window, "s", "--window"))
     if turbulence is not None:
-        settings = replace(settings, turbulence=si(turbulence, "m/s", "--turbulence"), learn=False)
-    records = [_read(name, chain) for name in logs]
-    for log in records:
-        if log.assumed:
-            reply.log(f"{log.name}: the noise of {', '.join(log.assumed)} is assumed")
-    return calibrate(
-        model, records, terms=terms, hold_out=[_read(name, chain) for name in held], settings=settings,
-        horizon=si(horizon, "s", "--horizon"), progress=reply.progress, threads=cores(),
-    )  # fmt: skip
+        out = replace(out, turbulence=si(turbulence, "m/s", "--turbulence"), learn=False)
+    return out
 
 
-def _read(name: str, chain: Chain) -> SeaLog:
+def _remark(reply: Reply, log: SeaLog, neutral: bool) -> None:
+    """What a record leaves to be assumed, and a ballast that the model has not."""
+    from towtank.field.log import MEASURED
+
+    unsaid = [name for name in log.channels if name in MEASURED and name not in log.std]
+    if unsaid or log.assumed:
+        reply.log(f"{log.name}: the noise of {', '.join(dict.fromkeys((*unsaid, *log.assumed)))} is assumed")
+    if not neutral and "ballasted to neutral" in str(dict(log.provenance)).lower():
+        reply.log(f"{log.name}: the craft was ballasted to neutral, the model is not: give --ballasted")
+
+
+def _read(name: str, map: str | None, chain: Chain) -> SeaLog:
     """A record: one that towtank wrote, or a file of any format that it reads."""
-    from importlib import import_module
-    from importlib.util import find_spec
+    from towtank.field.reading import read_sea_log
 
-    from towtank.field.files import read_log
-
-    path = Path(name)
-    if not path.exists():
+    if not Path(name).exists():
         raise InputError(f"{name}: no such file. Name a record: towtank log makes one from a file of the craft.")
-    if path.suffix == ".nc" or find_spec("towtank.field.reading") is None:
-        return read_log(path)
-    gate = import_module("towtank.field.reading.gate")
-    log: SeaLog = gate.read_sea_log(path, craft=chain.source)
-    return log
+    return read_sea_log(name, map, craft=chain.source)
 
 
 def _publish(chain: Chain, found: Calibration) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from functools import partial, reduce
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -136,7 +136,7 @@ def gathered(crew: Crew, cases: Sequence[Case], unknowns: Unknowns, z: Array, po
 def _joined(parts: Sequence[Piece]) -> Piece:
     def one(name: str) -> Array:
         arrays = [getattr(part, name) for part in parts]
-        return reduce(np.add, arrays) if name in SUMMED else np.concatenate(arrays)
+        return np.asarray(sum(arrays)) if name in SUMMED else np.concatenate(arrays)
 
     return Piece(**{field.name: one(field.name) for field in fields(Piece)})
 
@@ -266,7 +266,7 @@ def _onwards(dz: Array, told: Array, whole: Array) -> tuple[Array, float]:
     told, whole (k, k) : information on z with the motions left open, and with them fixed. A step goes told / whole of
     the way, so that steps form a geometric series.
 
-    Source     louis1982, sec. 5, summed to ``TERMS`` terms in place of the inverse, so that it never goes too far.
+    Source     louis1982, summed to ``TERMS`` terms in place of the inverse, so that it never goes too far.
     """
     out, term = np.zeros_like(dz), dz
     for _ in range(TERMS):

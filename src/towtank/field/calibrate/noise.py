@@ -74,7 +74,7 @@ class Links:
 def links_of(windows: Windows, settings: Settings) -> Links:
     """The links about the attitude in which the search starts.
 
-    Source     barshalom2001, sec. 6.2: white acceleration of density S over T gives the velocity S T, the position
+    Source     barshalom2001, ch. 6: white acceleration of density S over T gives the velocity S T, the position
                S T3 / 3, both together S T2 / 2. Velocities are in body axes, positions in the world's: the pair is
                turned by J1, that of attitude and rates by J2 (perron, eq. 2.11).
     """
@@ -109,7 +109,7 @@ def learned(now: Noise, first: Noise, squares: Array, free: Array) -> tuple[Nois
     free of the unknowns: their number less what the unknowns fit of them. A variance of ``free`` numbers is known to a
     share of root 2 / free.
 
-    Source     mackay1992, eq. 4.9: variance = squares / free, repeated.
+    Source     mackay1992, sec. 4: variance = squares / free, repeated.
     Valid      Within ``LEAST`` and ``MOST`` of the values at the start.
     """
     count = np.maximum(free, 1e-9)
