@@ -9,7 +9,7 @@ from scipy.linalg import cho_factor, cho_solve
 sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
 from calibrate_cases import hokie, records
 
-from towtank.field.calibrate.fit import Crew, Search, case_of, shared_of
+from towtank.field.calibrate.fit import Crew, Search, case_of, onwards, shared_of
 from towtank.field.calibrate.noise import Noise, learned
 from towtank.field.calibrate.normal import spread
 from towtank.field.calibrate.settings import Settings
@@ -95,3 +95,29 @@ def test_the_variance_of_largest_evidence_of_plain_numbers_is_their_mean_square(
         noise, moved = learned(noise, Noise(1.0, 1.0, 1.0, 1.0), squares, free)
     assert moved < 1e-6
     np.testing.assert_allclose(noise.scales, (y**2).mean() - 1.0, rtol=1e-6)
+
+
+def test_steps_with_motions_open_sum_towards_the_whole_way_and_never_beyond():
+    # With the motions fixed a coefficient looks better known (10) than it is (6): each step goes 0.6 of what is left.
+    told, whole = np.diag([6.0, 9.0]), np.diag([10.0, 10.0])
+    way = np.array([1.0, -2.0])
+    first = np.linalg.solve(whole, told @ way)
+    step, rest = onwards(first, told, whole)
+    np.testing.assert_allclose(step, way * (1.0 - np.array([0.4, 0.1]) ** 4), rtol=1e-12)
+    assert rest > 0.0
+
+
+def test_draws_of_the_motion_have_the_covariance_of_the_fit():
+    search, free = searched()
+    (it, _) = search.equations()
+    rng = np.random.default_rng(3)
+    drawn = np.array([it.drawn(rng)[0][3] for _ in range(600)])
+    # At a fixed z: what is shared is the record's own.
+    a, k = it.reduced[0], free.size
+    none = np.zeros_like(a)
+    none[k:, k:] = np.linalg.inv(a[k:, k:])
+    case = search.cases[0]
+    found = spread(case.windows, case.links, search.pieces[0], it, none)
+    # 600 draws know a standard deviation to 3 %; of 15 the worst is within 4 of these.
+    np.testing.assert_allclose(drawn.std(axis=0), np.sqrt(np.diag(found.states[3])), rtol=0.12)
+    search.crew.close()

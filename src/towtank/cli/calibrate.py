@@ -65,6 +65,12 @@ Map = Annotated[
 Ballasted = Annotated[
     bool, typer.Option("--ballasted", help="The craft was ballasted to neutral: its weight is its buoyancy.")
 ]
+Pairs = Annotated[
+    int,
+    typer.Option(
+        metavar="N", min=0, help="Draws that leave the motions open, for a short craft in strong eddies: 8 or so."
+    ),
+]
 Doubt = Annotated[
     float,
     typer.Option(
@@ -82,6 +88,7 @@ def calibrate(
     window: Window = None,
     turbulence: Turbulence = None,
     doubt: Doubt = 0.0,
+    pairs: Pairs = 0,
     ballasted: Ballasted = False,
     map: Map = None,
     out: Out = None,
@@ -106,7 +113,7 @@ def calibrate(
         held = [_read(name, map, chain) for name in hold_out or []]
         for log in (*records, *held):
             _remark(reply, log, ballasted)
-        settings = _settings(window, turbulence)
+        settings = replace(_settings(window, turbulence), pairs=pairs)
         from towtank.field.calibrate.calibrate import calibrate
         from towtank.quantity import si
 

@@ -39,8 +39,7 @@ SETTLED = 0.2
 LOOKS = 4
 """Steps of the noise in a round of the search, which cost less than to fly the windows once."""
 MEANS, DRAW_SEED = 6, 20
-"""Most steps with drawn motions, and the seed of these. The means run over all windows of a record, so one pair of
-draws is many."""
+"""Most steps with drawn motions, and the seed of these."""
 CLOSE, FAR = 0.1, 0.05
 """Step that is still to come, in standard deviations of all coefficients together, at which the last one ends; and the
 share of a step by which its own linear forecast may be off."""
@@ -232,10 +231,10 @@ class Search:
         for _ in range(MEANS):
             rng = np.random.default_rng(DRAW_SEED)
             info = np.eye(self.unknowns.size) + sum(it.told[0] for it in all_of)
-            drawn = [it.drawn(rng) for it in all_of]
-            sides = [self._drawn(drawn, side) for side in (-1.0, 1.0)]
+            draws = [[it.drawn(rng) for it in all_of] for _ in range(self.settings.pairs)]
+            sides = [self._drawn(drawn, side) for drawn in draws for side in (-1.0, 1.0)]
             mean = self.crew.each([partial(averaged, pair) for pair in zip(*sides, strict=True)])
-            dz, rest = _onwards(self.step(mean)[0], info, np.eye(len(info)) + sum(it.told[0] for it in mean))
+            dz, rest = onwards(self.step(mean)[0], info, np.eye(len(info)) + sum(it.told[0] for it in mean))
             self.z = self.z + dz
             self.points = [
                 Point(point.states + states, point.shared + shared)
@@ -260,7 +259,7 @@ class Search:
         ]
 
 
-def _onwards(dz: Array, told: Array, whole: Array) -> tuple[Array, float]:
+def onwards(dz: Array, told: Array, whole: Array) -> tuple[Array, float]:
     """The steps that would follow ``dz`` (k,) too, and the size of the first that is left out.
 
     told, whole (k, k) : information on z with the motions left open, and with them fixed. A step goes told / whole of
@@ -268,11 +267,12 @@ def _onwards(dz: Array, told: Array, whole: Array) -> tuple[Array, float]:
 
     Source     louis1982, summed to ``TERMS`` terms in place of the inverse, so that it never goes too far.
     """
-    out, term = np.zeros_like(dz), dz
+    out: Array = np.zeros_like(dz)
+    term: Array = dz
     for _ in range(TERMS):
         out = out + term
-        term = term - np.linalg.solve(whole, told @ term)
-    return out, float(np.sqrt(max(term @ told @ term, 0.0)))
+        term = np.asarray(term - np.linalg.solve(whole, told @ term))
+    return out, max(float(term @ told @ term), 0.0) ** 0.5
 
 
 def averaged(both: Sequence[Equations]) -> Equations:
@@ -335,7 +335,7 @@ def _searched(search: Search, settings: Settings, progress: Progress) -> Fit:
             break
         costs.append(value)
         progress.step("calibration", f"cost {value:.6g}")
-    if settings.mean:
+    if settings.pairs:
         all_of = search.centre(all_of)
     covariance = np.asarray(np.linalg.inv(np.eye(search.unknowns.size) + sum(it.told[0] for it in all_of)))
     return Fit(

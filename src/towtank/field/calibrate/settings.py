@@ -36,8 +36,9 @@ class Settings:
         only the ratio of thrust to resistance.
     push [m2/s3], twist [rad2/s3] : spectral densities of the accelerations that no term holds.
     learn : the last three are taken from the records themselves (largest evidence), starting from these values.
-    mean : the coefficients are those of largest density with the motions left open, not together with the most likely
-        motions; the second is biased where the water or other accelerations are seen in the motion.
+    pairs : draws of the motions by which the coefficients go from the largest density together with the motions to the
+        largest with the motions left open; 0 stays at the first. The first is biased for a short craft in strong
+        eddies; the draws have a scatter of their own, which falls with the root of their number.
     rounds : most steps of the search.   tolerance : it ends when a step is expected to gain less of the cost, which
         is a sum of squares in standard deviations.
     told : a coefficient is told by the record when its standard deviation falls below this share of the prior's.
@@ -52,7 +53,7 @@ class Settings:
     push: float = 1e-5
     twist: float = 1e-7
     learn: bool = True
-    mean: bool = True
+    pairs: int = 0
     rounds: int = 20
     tolerance: float = 0.1
     told: float = 0.9
@@ -61,8 +62,10 @@ class Settings:
         """Refuse what is no number above zero."""
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, bool) and not (np.isfinite(value) and value > 0.0):
+            if not isinstance(value, bool) and field.name != "pairs" and not (np.isfinite(value) and value > 0.0):
                 raise InputError(
                     f"calibration: {field.name} is {value}. It is a length, a scale or a count: give a number above 0; "
                     "a very small one takes the effect away."
                 )
+        if self.pairs < 0:
+            raise InputError(f"calibration: pairs is {self.pairs}. Give a number of draws, 0 for none.")
