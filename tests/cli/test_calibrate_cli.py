@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
 from calibrate_cases import hokie, records
-
 from towtank.cli.app import app
 from towtank.craft.library import write_craft_copy
 from towtank.derive.files import read_derivatives, write_derivatives

@@ -1,14 +1,9 @@
 """The reduced equations against dense least squares, and a linear case against its closed form."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
 from calibrate_cases import hokie, records
-
 from towtank.field.calibrate.fit import Crew, Search, case_of, onwards, shared_of
 from towtank.field.calibrate.noise import Noise, learned
 from towtank.field.calibrate.normal import spread
