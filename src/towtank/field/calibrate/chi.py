@@ -13,8 +13,7 @@ from towtank.field.calibrate.shoot import CHUNK, Turn
 from towtank.frames import Array
 
 SAMPLED = 8
-"""Groups of windows on which the unknowns' share is taken, at least; it is some per cent of the samples, so a sample of it
-does."""
+"""Groups of windows on which the unknowns' share is taken, at least: it is some per cent of the samples."""
 
 
 def leverage(fit: Fit, number: int, crew: Crew) -> Array:
