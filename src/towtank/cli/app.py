@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from towtank.cli.assess import assess
+from towtank.cli.calibrate import calibrate
 from towtank.cli.check import check
 from towtank.cli.check_coefficients import check_coefficients
 from towtank.cli.compare import compare
@@ -80,6 +81,7 @@ for _command in (
     compare,
     sweep,
     design,
+    calibrate,
     report,
     log,
     doctor,
