@@ -11,7 +11,7 @@ OUT    ?= hokie
 ENGINE := hatch_build.py $(wildcard src/towtank/symbols.py src/towtank/engine/*.py src/towtank/engine/c/* \
             src/towtank/model/*.py src/towtank/pilot/*.py)
 
-.PHONY: help install openfoam run test lint bench bench-engine bench-derive bench-robust validate validate-slurm validate-openfoam clean
+.PHONY: help install openfoam run test lint bench bench-engine bench-derive bench-robust bench-calibrate validate validate-slurm validate-openfoam clean
 .DEFAULT_GOAL := help
 
 help:
@@ -27,6 +27,7 @@ help:
 	@echo "make bench-engine  the engine against the machine's peak, written to bench/engine.json"
 	@echo "make bench-derive  identification of 200 runs of 2000 samples, written to bench/derive.json"
 	@echo "make bench-robust  1000 drawn craft through all trials and requirements, written to bench/robust.json"
+	@echo "make bench-calibrate  10 records of 30 min at 10 Hz, 30 coefficients, written to benchmarks/calibrate.json"
 	@echo "make clean     remove $(VENV)/, caches and bench/"
 
 install: $(VENV)/.engine
@@ -65,6 +66,7 @@ validate: $(VENV)/.tools
 	$(BIN)/python validation/suboff.py
 	OMP_NUM_THREADS=1 $(BIN)/python validation/interval_coverage.py
 	$(BIN)/python validation/prediction.py
+	OMP_NUM_THREADS=1 $(BIN)/python validation/calibrate_twin.py
 	$(BIN)/pytest -m validate
 
 validate-slurm: $(VENV)/.engine $(VENV)/.tools
@@ -87,6 +89,9 @@ bench-derive: $(VENV)/.engine
 
 bench-robust: $(VENV)/.engine
 	$(BIN)/python benchmarks/robust.py
+
+bench-calibrate: $(VENV)/.engine
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/calibrate.py
 
 clean:
 	rm -rf $(VENV) bench build dist src/towtank/engine/lib .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

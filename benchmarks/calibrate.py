@@ -95,7 +95,7 @@ def main(count: int, minutes: float) -> None:
     model = model_of()
     logs, terms = records(model, count, 60.0 * minutes), terms_of(model)
     parts: dict[str, float] = {}
-    for name in ("equations", "learn"):
+    for name in ("advance", "learn"):
         _watched(name, parts)
     watch, wall, cpu = Watch(), time.perf_counter(), time.process_time()
     found = calibrate(model, logs, terms=terms, progress=watch)

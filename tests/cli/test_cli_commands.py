@@ -29,6 +29,7 @@ COMMANDS = (
     "log",
     "sea",
     "compare",
+    "calibrate",
     "assess",
     "report",
     "doctor",

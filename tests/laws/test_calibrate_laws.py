@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from calibrate_cases import STD, hokie, off, records
 
+from calibrate_cases import STD, hokie, off, records
 from towtank.derive.files import read_derivatives, write_derivatives
 from towtank.engine.plan import Leg
 from towtank.errors import InputError

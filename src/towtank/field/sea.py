@@ -43,6 +43,9 @@ _SEEN = ("speed", "ahead", "slip", "plunge", "rudder", "elevator", "aileron", "h
 _COUNTED = ("psi", "fin_travel")
 """Channels that the engine counts from the start of a run; a leg that waits for one is told what went before."""
 
+DRIFT = 1e-7
+"""Departure of a quaternion's length from 1 that is taken out between pieces; the engine refuses 1e-6."""
+
 
 @dataclass(frozen=True)
 class Swim:
@@ -255,7 +258,7 @@ class _Voyage:
         ended = np.where((flights.ended == Ended.DONE) & (speed > self.fastest), Ended.TOO_FAST, flights.ended)
         self.ended = np.where(alive, ended, self.ended)
         self.end_time = np.where(alive, begin + flights.end_time, self.end_time)
-        self.state = np.where((self.ended == Ended.DONE)[:, None], flights.state, self.state)
+        self.state = np.where((self.ended == Ended.DONE)[:, None], unit(flights.state), self.state)
         one = int(np.argmax(alive))
         marks = flights.mark_time[one]
         last = log.shape[1] - 1
@@ -348,3 +351,14 @@ def _orders(voyage: _Voyage, ordered: Any, heading: Array, alive: NDArray[np.boo
         "pitch_order": np.where(dived & pitching, ordered("pitch") + voyage.trial.setting.trim.pitch, np.nan),
     }
     return {name: values for name, values in found.items() if np.isfinite(values).any()}
+
+
+def unit(states: Array) -> Array:
+    """``states`` (N, 13 + ...) with quaternions of length 1 where the steps have moved the length by ``DRIFT``.
+
+    The engine takes a start of length 1 only. The rotation is that of the quaternion's direction; it is not changed.
+    """
+    size = np.linalg.norm(states[:, 3:7], axis=1, keepdims=True)
+    out = states.copy()
+    out[:, 3:7] = np.where(np.abs(size - 1.0) > DRIFT, states[:, 3:7] / np.maximum(size, DRIFT), states[:, 3:7])
+    return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from functools import partial
@@ -149,6 +149,7 @@ class Search:
         self.points = [Point(c.windows.guess.copy(), c.prior.centre.copy()) for c in cases]
         self.first = noise_of(settings)
         self.noise = [self.first] * len(cases)
+        self.learning = [settings.learn] * len(cases)
         self.pieces = gathered(crew, cases, unknowns, self.z, self.points)
 
     def cost(self, z: Array, points: Sequence[Point], pieces: Sequence[Piece]) -> float:
@@ -158,10 +159,15 @@ class Search:
             for c, noise, point, piece in zip(self.cases, self.noise, points, pieces, strict=True)
         )
 
-    def equations(self) -> list[Equations]:
-        """Normal equations of each record, solved for its windows."""
+    def equations(self, known: Mapping[int, Equations] | None = None) -> list[Equations]:
+        """Normal equations of each record, solved for its windows.
+
+        known : number of a record -> its equations, where they still hold.
+        """
 
         def one(i: int) -> Equations:
+            if known and i in known:
+                return known[i]
             case, k = self.cases[i], self.unknowns.size
             out = equations(case.windows, case.links, self.noise[i], case.prior, self.points[i], self.pieces[i], k)
             _ = out.told  # solved here, in this thread
@@ -202,8 +208,11 @@ class Search:
             share *= 0.5
         return None
 
-    def learn(self, all_of: Sequence[Equations]) -> bool:
-        """Take the noise of each record from what its links are expected to miss after the step; True when found."""
+    def learn(self, all_of: Sequence[Equations]) -> list[Equations]:
+        """Take the noise of each record from what its links are expected to miss after the step; the equations then.
+
+        A record whose noise is found keeps it.
+        """
         k = self.unknowns.size
         covariance = np.asarray(np.linalg.inv(np.eye(k) + sum(it.told[0] for it in all_of)))
         dz, backs, _ = self.step(all_of)
@@ -217,9 +226,10 @@ class Search:
             counts = counted(case.windows, case.links, noise, gone, point.states + states, found)
             return learned(noise, self.first, *counts)
 
-        new = self.crew.each([partial(one, i) for i in range(len(self.cases))])
-        self.noise = [noise for noise, _ in new]
-        return max(moved for _, moved in new) < SETTLED
+        open_ones = [i for i, learning in enumerate(self.learning) if learning]
+        for i, (noise, moved) in zip(open_ones, self.crew.each([partial(one, i) for i in open_ones]), strict=True):
+            self.noise[i], self.learning[i] = noise, moved >= SETTLED
+        return self.equations({i: it for i, it in enumerate(all_of) if i not in open_ones})
 
     def centre(self, all_of: Sequence[Equations]) -> list[Equations]:
         """Go from the largest density of all unknowns together to that of z with the motions left open.
@@ -317,17 +327,16 @@ def fit(
 
 def _searched(search: Search, settings: Settings, progress: Progress) -> Fit:
     costs = [search.cost(search.z, search.points, search.pieces)]
-    settled, gain, learning = False, np.inf, settings.learn
+    settled, gain = False, np.inf
     for number in range(settings.rounds + 1):
         all_of = search.equations()
         dz, backs, gain = search.step(all_of)
         # Not before the first step: until then, what is missed is the guess's own.
-        for _ in range(LOOKS if learning and number > 0 else 0):
-            if learning:
-                learning = not search.learn(all_of)
-                all_of = search.equations()
+        for _ in range(LOOKS if number > 0 else 0):
+            if any(search.learning):
+                all_of = search.learn(all_of)
                 dz, backs, gain = search.step(all_of)
-        settled = gain < settings.tolerance and not learning
+        settled = gain < settings.tolerance and not any(search.learning)
         if settled or number == settings.rounds:
             break
         value = search.advance(dz, backs, search.cost(search.z, search.points, search.pieces))
