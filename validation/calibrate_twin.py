@@ -151,12 +151,15 @@ def group_of(number: int) -> list[Outcome]:
 
 
 def rows(found: list[Outcome]) -> Iterator[list[str]]:
-    """Coefficient ("all" for the mean over the terms), seas, coverage, mean and spread of the pulls, what is left."""
+    """Coefficient ("all" for the mean over the terms), seas, coverage, mean and spread of the pulls, what is left.
+
+    The coverage counts all seas; mean and spread are of those whose search ended by itself: one that did not says so.
+    """
     pulls, left = np.array([o.pulls for o in found]), np.array([o.left for o in found])
-    terms = len(free().chosen)
+    settled, terms = np.array([o.settled for o in found]), len(free().chosen)
     for name, a, b in (("all", pulls[:, :terms], left[:, :terms]), *zip(names(), pulls.T, left.T, strict=True)):
-        inside = float((np.abs(a) < NORMAL).mean())
-        yield [name, str(len(found)), f"{inside:.4f}", f"{a.mean():.3f}", f"{a.std():.3f}", f"{np.median(b):.4f}"]
+        inside, own = float((np.abs(a) < NORMAL).mean()), a[settled]
+        yield [name, str(len(found)), f"{inside:.4f}", f"{own.mean():.3f}", f"{own.std():.3f}", f"{np.median(b):.4f}"]
 
 
 def main(seas: int) -> None:

@@ -39,7 +39,8 @@ def test_the_truth_of_a_few_seas_lies_within_the_intervals():
 
 def test_the_stored_twin_experiment_holds_the_truth_in_93_to_97_percent():
     table = {row["coefficient"]: row for row in read_table(VALIDATION / "calibrate_twin.csv")}
-    assert int(table["all"]["seas"]) >= 100
+    assert int(table["all"]["seas"]) >= 200
     assert 0.93 <= float(table["all"]["coverage_95"]) <= 0.97
-    # One coefficient over 120 seas: a share of 0.95 has a standard deviation of 0.02; of 28 the worst is within four.
+    # One coefficient over 200 seas: a share of 0.95 has a standard deviation of 0.015. The lowest is Kup, 0.88: its
+    # interval is a fifth too narrow, as docs/calibrate.md says.
     assert min(float(row["coverage_95"]) for row in table.values()) > 0.87

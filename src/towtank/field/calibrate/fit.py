@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TypeVar
 
@@ -29,7 +29,7 @@ from towtank.field.calibrate.unknowns import Unknowns
 from towtank.field.calibrate.windows import Windows
 from towtank.frames import Array
 from towtank.parallel import cores
-from towtank.progress import Progress
+from towtank.progress import Progress, Silent
 
 T = TypeVar("T")
 HALVINGS = 8
@@ -45,6 +45,8 @@ CLOSE, FAR = 0.1, 0.05
 share of a step by which its own linear forecast may be off."""
 TERMS = 4
 """Steps forecast at a time."""
+PILOTS, MANY = 2, 4
+"""Of ``MANY`` records or more the first ``PILOTS`` are searched alone, and the search of all begins where that ends."""
 SUMMED = ("gg", "g", "square")
 """Fields of ``Piece`` that are sums over the windows."""
 
@@ -143,12 +145,16 @@ def _joined(parts: Sequence[Piece]) -> Piece:
 class Search:
     """A search under way: where it is, and the noise of each record."""
 
-    def __init__(self, cases: Sequence[Case], unknowns: Unknowns, settings: Settings, crew: Crew) -> None:
+    def __init__(
+        self, cases: Sequence[Case], unknowns: Unknowns, settings: Settings, crew: Crew, begun: Fit | None = None
+    ) -> None:
+        """``begun`` : of some of the records, where the search begins: their coefficients, the mean of their noise."""
         self.cases, self.unknowns, self.settings, self.crew = tuple(cases), unknowns, settings, crew
-        self.z = np.zeros(unknowns.size)
+        self.z = begun.z if begun else np.zeros(unknowns.size)
         self.points = [Point(c.windows.guess.copy(), c.prior.centre.copy()) for c in cases]
         self.first = noise_of(settings)
-        self.noise = [self.first] * len(cases)
+        scales = [np.log(one.noise.scales) for one in begun.found] if begun else [np.log(self.first.scales)]
+        self.noise = [Noise(*np.exp(np.mean(scales, axis=0)).tolist())] * len(cases)
         self.learning = [settings.learn] * len(cases)
         self.pieces = gathered(crew, cases, unknowns, self.z, self.points)
 
@@ -317,8 +323,11 @@ def fit(
     crew = Crew(threads)
     progress.start("calibration", settings.rounds)
     try:
-        search = Search(cases, unknowns, settings, crew)
-        found = _searched(search, settings, progress)
+        begun = None
+        if len(cases) >= MANY:
+            alone = replace(settings, pairs=0)
+            begun = _searched(Search(cases[:PILOTS], unknowns, alone, crew), alone, Silent())
+        found = _searched(Search(cases, unknowns, settings, crew, begun), settings, progress)
     finally:
         crew.close()
     progress.done("calibration")
