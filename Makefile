@@ -60,7 +60,7 @@ lint: $(VENV)/.tools
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/pytest -m "not validate and not slurm" -n $(JOBS) --dist loadfile
+	OMP_NUM_THREADS=1 $(BIN)/pytest -m "not validate and not slurm" -n $(JOBS) --dist loadfile
 
 validate: $(VENV)/.tools
 	$(BIN)/python validation/suboff.py
