@@ -41,6 +41,6 @@ def test_the_stored_twin_experiment_holds_the_truth_in_93_to_97_percent():
     table = {row["coefficient"]: row for row in read_table(VALIDATION / "calibrate_twin.csv")}
     assert int(table["all"]["seas"]) >= 200
     assert 0.93 <= float(table["all"]["coverage_95"]) <= 0.97
-    # One coefficient over 200 seas: a share of 0.95 has a standard deviation of 0.015. The lowest is Kup, 0.88: its
-    # interval is a fifth too narrow, as docs/calibrate.md says.
+    # One coefficient over 200 seas: a share of 0.95 has a standard deviation of 0.015. The lowest is Kup, 0.88: it
+    # is shifted by 0.6 of its standard deviation, as docs/calibrate.md says.
     assert min(float(row["coverage_95"]) for row in table.values()) > 0.87
